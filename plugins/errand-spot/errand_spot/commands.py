@@ -86,7 +86,11 @@ def serve(
             return
 
 
-sdk = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
+sdk = typer.Typer(
+    help="Run a program of Spot's SDK, unchanged, with a simulated Spot.",
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
 
 
 @sdk.command(context_settings={"ignore_unknown_options": True, "allow_interspersed_args": False})
@@ -160,7 +164,7 @@ def _write_graph(world: World, folder: Path) -> None:
         write_map(world_map(world), folder)
 
 
-def _free_floor(world: World) -> Pose2D:
+def free_floor(world: World) -> Pose2D:
     """Pose nearest to the world's start with free floor around and ahead, away from people; else the start itself."""
     from skills.grid_map import load_grid_map
 
@@ -204,7 +208,7 @@ def _server(
         _write_graph(opened, graph)
     if start is not None:
         refuse_blocked(opened, start)
-    placed = only_robot("Alice", opened, seed=seed, start=start or _free_floor(opened))
+    placed = only_robot("Alice", opened, seed=seed, start=start or free_floor(opened))
     compile_first()
     simulation = simulate(opened, {"Alice": placed}, seed=seed, record=False)
     robot = simulation.robots["Alice"]

@@ -2,17 +2,21 @@
 
     python launch.py CERTIFICATE PORT real|client SCRIPT [ARGUMENT ...]
 
-The interpreter needs the SDK, and nothing of Errand. A program that names no certificate trusts the server's, and its
-robots are reached at the server's port. With `client` the program steps the robot whenever its main thread sleeps.
+The interpreter needs the SDK, and nothing of Errand. Whatever address, certificate and login the program names, it
+reaches the server, trusts its certificate and logs in by the variables of the environment. With `client` the program
+steps the robot whenever its main thread sleeps.
 """
 
 from __future__ import annotations
 
+import os
 import queue  # noqa: F401  it keeps the true time, as `grpc` does
+import re
 import runpy
 import sys
 import time
-from functools import partialmethod
+from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from threading import current_thread, main_thread
 from types import ModuleType
@@ -28,24 +32,49 @@ if TYPE_CHECKING:
 ADVANCE: Final = "/errand.Clock/Advance"
 """Call by which a client steps the robot: google.protobuf.Duration -> google.protobuf.Timestamp."""
 _NAME: Final = "clock.spot.robot"
+_ADDRESS: Final = "127.0.0.1"
+_LOGIN: Final = ("BOSDYN_CLIENT_USERNAME", "BOSDYN_CLIENT_PASSWORD")
+_LEAST_SDK: Final = (3, 2, 0)
+
+
+def refuse_old_sdk() -> None:
+    """Ends the program with a line when its interpreter has no SDK, or one that is too old."""
+    try:
+        found = version("bosdyn-client")
+    except PackageNotFoundError:
+        found = ""
+    if tuple(int(part) for part in re.findall(r"\d+", found)[:2]) < _LEAST_SDK[:2]:
+        least = ".".join(map(str, _LEAST_SDK))
+        said = f"{found} is too old" if found else "is missing"
+        hint = f"{sys.executable} -m pip install 'bosdyn-client>={least}'"
+        sys.exit(f"Error: the SDK (bosdyn-client) {said}; at least {least} is needed.\nHint: {hint}")
 
 
 def use_server(certificate: Path, port: int) -> None:
-    """Makes the SDK of this process trust a certificate and use a port, unless a program says otherwise."""
+    """Makes the SDK of this process reach and trust the server whatever address, certificate or login it names."""
+    from bosdyn.client import channel
+    from bosdyn.client.auth import AuthClient
+    from bosdyn.client.exceptions import ResponseError
     from bosdyn.client.sdk import Sdk
 
-    load, create = Sdk.load_robot_cert, Sdk.create_robot
+    load, connect = Sdk.load_robot_cert, channel.create_secure_channel
+    user, secret = (os.environ.get(name, "") for name in _LOGIN)
 
     def load_robot_cert(self: Sdk, resource_path_glob: str | None = None) -> None:
-        load(self, resource_path_glob or str(certificate))
+        load(self, str(certificate))
 
-    def create_robot(self: Sdk, *arguments: Any, server_port: int, **named: Any) -> Any:
-        robot = create(self, *arguments, **named)
-        robot.update_secure_channel_port(server_port)
-        return robot
+    def create_secure_channel(_address: str, _port: int, *arguments: Any, **named: Any) -> Any:
+        return connect(_ADDRESS, port, *arguments, **named)
 
-    Sdk.load_robot_cert = load_robot_cert
-    Sdk.create_robot = partialmethod(create_robot, server_port=port)
+    def logged_in(call: Callable[..., Any]) -> Callable[..., Any]:
+        return lambda self, own, password, *more, **named: call(self, user or own, secret or password, *more, **named)
+
+    def reason(self: ResponseError) -> str:
+        return f"{told(self)} {getattr(self.response, 'message', '')}".rstrip()
+
+    told, ResponseError.__str__ = ResponseError.__str__, reason  # it names what was refused
+    Sdk.load_robot_cert, channel.create_secure_channel = load_robot_cert, create_secure_channel
+    AuthClient.auth, AuthClient.auth_async = logged_in(AuthClient.auth), logged_in(AuthClient.auth_async)
 
 
 def step_in_sleep(certificate: Path, port: int) -> None:
@@ -54,7 +83,7 @@ def step_in_sleep(certificate: Path, port: int) -> None:
     Call it before the import of the SDK. Other threads sleep in true time.
     """
     trusted = grpc.ssl_channel_credentials(certificate.read_bytes())
-    channel = grpc.secure_channel(f"127.0.0.1:{port}", trusted, [("grpc.ssl_target_name_override", _NAME)])
+    channel = grpc.secure_channel(f"{_ADDRESS}:{port}", trusted, [("grpc.ssl_target_name_override", _NAME)])
     advance = channel.unary_unary(ADVANCE, Duration.SerializeToString, Timestamp.FromString)
     robot_ns = [advance(Duration()).ToNanoseconds()]
 
@@ -83,6 +112,7 @@ def step_in_sleep(certificate: Path, port: int) -> None:
 def main() -> None:
     """Runs the script of the command line as `python SCRIPT` does."""
     certificate, port, pace, script, *arguments = sys.argv[1:]
+    refuse_old_sdk()
     if pace == "client":
         step_in_sleep(Path(certificate), int(port))
     use_server(Path(certificate), int(port))

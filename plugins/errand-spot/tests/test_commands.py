@@ -70,15 +70,17 @@ def test_a_program_walks_the_robot_and_its_exit_code_is_kept(tmp_path, capfd, pa
 
 
 def test_the_robot_starts_on_free_floor_away_from_people_with_space_ahead():
-    from errand_spot.commands import _free_floor
-    from executive.app.prepare.worlds import free_ground, open_world
-    from plant.worlds.seeding import standing_points_W
+    from errand_spot.commands import free_floor
+    from executive.app.prepare.worlds import open_world
+    from plant.worlds.seeding import place_people
+    from skills.grid_map import load_grid_map
 
     world = open_world("flat")
-    start, ground = _free_floor(world), free_ground(world)
+    start, ground = free_floor(world), load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
     line = [(start.x_m + d * math.cos(start.yaw_rad), start.y_m + d * math.sin(start.yaw_rad)) for d in (0.0, 1.0, 2.0)]
     assert min(ground.distance_m(np.array(line))) > 0.5
-    assert min(math.dist(at, each) for at in line for each in standing_points_W(world)) > 1.0
+    people_W = [each.X_WO.translation()[:2] for seed in range(200) for each in place_people(world, seed)]
+    assert min(math.dist(at, each) for at in line for each in people_W) > 1.0
 
 
 # options of the command -> what the refusal says

@@ -16,12 +16,11 @@ from pydrake.math import RigidTransform
 from errand_spot.messages import pose, timestamp
 from errand_spot.perception import SpotPerception, world_map
 from errand_spot.server.identity import credentials
+from executive import Request
 from executive.app.prepare.placed_robots import only_robot
 from executive.app.prepare.worlds import open_world
 from executive.app.runs.simulated import simulate
-from executive.mission.request import Request
 from executive.run.control import Control
-from executive.run.control_state import Mode
 from executive.run.visitor import RunVisitor
 from skills.robot import Pose2D
 from tests.benchmarks.served_missions import MISSIONS, Cut
@@ -142,7 +141,8 @@ def test_a_run_whose_robot_is_silent_for_a_while_goes_on_by_itself(tmp_path):
 
     request = Request(sentence="go to the kitchen", seed=3, record=False, out=tmp_path / "out")
     ended = through_api(request, tmp_path / "credentials", with_cut)
-    assert cuts[0].seen == [(Mode.RUNNING, ""), (Mode.PAUSED, "Alice has not answered for 3 s"), (Mode.RUNNING, "")]
+    seen = [(mode.value, reason) for mode, reason in cuts[0].seen]
+    assert seen == [("running", ""), ("paused", "Alice has not answered for 3 s"), ("running", "")]
     assert (ended.outcome, ended.verdict) == ("success", True), ended
 
 
@@ -159,7 +159,7 @@ def test_a_run_whose_lease_is_taken_goes_on_when_the_operator_resumes_it(tmp_pat
     request = Request(sentence="go to the kitchen", seed=3, record=False, out=tmp_path / "out")
     ended = through_api(request, tmp_path / "credentials", with_tablet)
     tablet = tablets[0]
-    assert [mode for mode, _ in tablet.seen] == [Mode.RUNNING, Mode.PAUSED, Mode.PAUSED, Mode.RUNNING]
+    assert [mode.value for mode, _ in tablet.seen] == ["running", "paused", "paused", "running"]
     assert tablet.seen[1][1].startswith("tablet") and tablet.seen[1][1].endswith("holds the lease of Alice")
     assert tablet.poses[170].x_m == pytest.approx(tablet.poses[200].x_m, abs=0.02)
     assert (ended.outcome, ended.verdict) == ("success", True), ended

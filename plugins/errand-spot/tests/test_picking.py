@@ -1,20 +1,25 @@
 """What stands at a point is picked up, where a grasp is allowed."""
 
+from dataclasses import dataclass, replace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from errand_spot.picking import PointPicker, observe
 from plant.robots.spot.kind import spot_capabilities
-from skills.api import Cause
-from skills.manipulation.grasp.skill import Grasp
+from skills.api import PlanningError
 from skills.robot import Pose2D
-from skills.routine import SkillFailure
-from skills.testing.blocks import ROOM, TABLE_CAN
+from skills.stack import default_stack
+from skills.testing.blocks import Block
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot, Start
 
 TOP_M = 0.75
-"""Height of the room's table."""
+"""Height of the table."""
+LEGS = [Block(x, y, x + 0.05, y + 0.05, 0.0, 0.70, (90, 60, 40)) for x in (1.2, 1.75) for y in (-0.6, 0.55)]
+TABLE = [Block(1.2, -0.6, 1.8, 0.6, 0.70, TOP_M, (130, 90, 60)), *LEGS]
+CAN = Block(1.347, -0.033, 1.413, 0.033, TOP_M, TOP_M + 0.115, (200, 20, 25), loose=True)
 
 
 def table_points(x0=1.2, y0=-0.6, x1=1.8, y1=0.6, z=TOP_M, apart=0.02):
@@ -53,7 +58,7 @@ def before_the_table():
     """A robot before a table with a can, and how to pick up what stands at a point; returns the picker and the end."""
     clock = VirtualClock()
     start = Start(Pose2D(0.45, 0.0, 0.0))
-    robot = ScriptedRobot(clock, capabilities=spot_capabilities(), blocks=[*ROOM, TABLE_CAN], start=start)
+    robot = ScriptedRobot(clock, capabilities=spot_capabilities(), blocks=[*TABLE, CAN], start=start)
     lease = robot.take_lease("test")
 
     def pick(point_O, allows=lambda R_OH: True, most_s=90.0):
@@ -68,9 +73,22 @@ def before_the_table():
     return robot, pick
 
 
-def is_stuck(*_):
-    raise SkillFailure(Cause.PLANNING, "no free path was found for the arm")
-    yield
+@dataclass
+class Stuck:
+    """The usual planner of the arm, which finds no path while the robot holds something."""
+
+    robot: ScriptedRobot
+    planner: Any
+    was_asked: bool = False
+
+    def path(self, *ends):
+        if self.robot.held is None:
+            return self.planner.path(*ends)
+        self.was_asked = True
+        raise PlanningError("no free path was found for the arm")
+
+    def __getattr__(self, name):
+        return getattr(self.planner, name)
 
 
 ANY, NONE = (lambda R_OH: True), (lambda R_OH: False)
@@ -89,9 +107,11 @@ def test_an_object_at_a_point_is_picked_up_where_that_is_allowed(
 ):
     robot, pick = before_the_table
     if not there:
-        robot.blocks.remove(TABLE_CAN)
+        robot.blocks.remove(CAN)
+    stuck = Stuck(robot, default_stack().arm_planner)
     if not carried:
-        monkeypatch.setattr(Grasp, "_carry", is_stuck)
+        monkeypatch.setattr("errand_spot.picking.default_stack", lambda: replace(default_stack(), arm_planner=stuck))
     picker, held = pick(point_O, allows)
+    assert stuck.was_asked == (not carried)
     in_hand = None if robot.held is None else robot.held.colour
-    assert (held, not picker.no_plan, in_hand) == (holds, planned, TABLE_CAN.colour if holds else None)
+    assert (held, not picker.no_plan, in_hand) == (holds, planned, CAN.colour if holds else None)

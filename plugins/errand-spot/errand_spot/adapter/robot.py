@@ -23,6 +23,7 @@ from errand_spot.adapter.connection import Connection, LostError, RobotClock
 from errand_spot.adapter.heartbeat import Heartbeat
 from errand_spot.adapter.readings import off_path_rad
 from errand_spot.adapter.sensors import OLD_STATE_S, Sensors
+from skills.command_table import refusal_of
 from skills.robot import (
     ArmTrajectory,
     Battery,
@@ -220,6 +221,10 @@ class ApiRobot:
 
     def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
         """Moves the gripper to an opening with at most force_n at its tip."""
+        if (gripper := self._capabilities.gripper) is None:
+            return self._refused("set_gripper: the robot has no gripper", CommandCause.UNSUPPORTED)
+        if (out := gripper.refusal(opening, force_n)) is not None:
+            return self._refused(out, CommandCause.INVALID)
         refused = self._objection("gripper", lease, until_s, (opening, force_n))
         return refused or self._send(commands.claw(opening, force_n), Sent(0, "gripper", until_s=until_s))
 
@@ -397,15 +402,10 @@ class ApiRobot:
 
     def _objection(self, part: str, lease: Lease, until_s: float, values: Iterable[float] = ()) -> CommandId | None:
         """Refuses a forbidden command; returns None for an allowed one."""
-        now_s, values = self._clock.now(), np.append(np.asarray(values, dtype=float), min(until_s, 1e9))
+        now_s = self._clock.now()
         clock_s, state_s = now_s - self._synchronised_s, self.sensors.silent_s()
-        if (gone := self._without(lease)) is not None:
-            return self._refused(f"{part}: {gone}", CommandCause.NO_LEASE)
-        if not np.isfinite(values).all():
-            return self._refused(f"{part}: {values[:-1]} until {until_s} s is not finite", CommandCause.INVALID)
-        if until_s <= now_s:
-            late = f"{part}: expires at {until_s:.2f} s, and it is {now_s:.2f} s already"
-            return self._refused(late, CommandCause.LATE)
+        if refused := refusal_of(part, self._without(lease), values, until_s=until_s, now_s=now_s):
+            return self._refused(*refused)
         if clock_s > OLD_CLOCK_S:
             old = f"{part}: the clocks were last synchronised {clock_s:.0f} s ago; check the network"
             return self._refused(old, CommandCause.NO_ANSWER)

@@ -100,10 +100,12 @@ class _ServiceHandler:
                     check_values(asked)
                 return answer(asked, call)
 
-            responses, error = self._answered(answered, response_type, many=method.server_streaming)
-            for response in responses:
-                _fill_header(response, requests[0], error, received_s, self._now())
-            return iter(responses) if method.server_streaming else responses[0]
+            def responses() -> Iterator[Any]:
+                for response, error in self._answered(answered, response_type, many=method.server_streaming):
+                    _fill_header(response, requests[0], error, received_s, self._now())
+                    yield response
+
+            return responses() if method.server_streaming else next(responses())
 
         handler_of = {
             (False, False): grpc.unary_unary_rpc_method_handler,
@@ -112,16 +114,17 @@ class _ServiceHandler:
         }[streams]
         return handler_of(handle, parse, response_type.SerializeToString)
 
-    def _answered(self, answer: Callable[[], Any], response_type: Any, *, many: bool) -> tuple[list[Any], Any]:
-        """Returns the responses, one unless there are `many`, or the API's error for an exception of the service."""
+    def _answered(self, answer: Callable[[], Any], response_type: Any, *, many: bool) -> Iterator[tuple[Any, Any]]:
+        """Yields the responses, one unless there are `many`, each with the API's error for an exception, the last."""
         Error = header_pb2.CommonError
         try:
-            return (list(answer()) if many else [answer()]), Error(code=Error.CODE_OK)
+            for response in answer() if many else [answer()]:
+                yield response, Error(code=Error.CODE_OK)
         except (InvalidRequestError, DecodeError) as invalid:  # a message within a message is decoded late
-            return [response_type()], Error(code=Error.CODE_INVALID_REQUEST, message=str(invalid))
+            yield response_type(), Error(code=Error.CODE_INVALID_REQUEST, message=str(invalid))
         except Exception as failed:
             _LOG.exception("%s failed", self._service.type)
-            return [response_type()], Error(code=Error.CODE_INTERNAL_SERVER_ERROR, message=str(failed))
+            yield response_type(), Error(code=Error.CODE_INTERNAL_SERVER_ERROR, message=str(failed))
 
 
 def _collected(given: Iterable[Any], context: grpc.ServicerContext) -> list[Any]:

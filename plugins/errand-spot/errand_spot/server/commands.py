@@ -263,6 +263,7 @@ def _arm_motion(request: Any, computer: Computer, snapshot: Snapshot, now_s: flo
         "arm_joint_move_command": lambda: arm.JointMove(given, now_rad, now_s, solver),
         "named_arm_position_command": lambda: arm.Named(given),
         "arm_cartesian_command": lambda: hand.Cartesian(given, snapshot, now_s),
+        "arm_impedance_command": lambda: hand.Impedance(given, snapshot, now_s),
         "arm_gaze_command": lambda: hand.Gaze(given, snapshot),
         "arm_velocity_command": lambda: hand.Moving(given, snapshot, end_of(given, now_s, which)),
         "arm_stop_command": arm.ArmHalt,

@@ -12,7 +12,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from enum import Enum
 from itertools import count
-from threading import Event
+from threading import Condition, Event
 from typing import Any, Final, Protocol, TypeVar
 
 import numpy as np
@@ -179,7 +179,7 @@ class Computer:
         self.regions: Sequence[Region] = ()
         """No-go regions of clients."""
         self._motions: dict[str, Motion] = {}
-        self._work = WorkQueue()
+        self._work, self._stepped = WorkQueue(), Condition()
         self._started_s = time.time() if pace is Pace.REAL else _CLIENT_START_S
         self._started_monotonic_s = time.monotonic()
         self.watchers: list[Callable[[], None]] = []
@@ -244,6 +244,13 @@ class Computer:
         self.scan_points.take(self.snapshot.scan)
         for motion in dict.fromkeys(self._motions.values()):
             motion.tick(self)
+        with self._stepped:
+            self._stepped.notify_all()
+
+    def wait_for_step(self, most_s: float) -> None:
+        """Waits, in a client's thread, until the next step is done, or for a wall time (s)."""
+        with self._stepped:
+            self._stepped.wait(most_s)
 
     # -- motors ------------------------------------------------------------------------------------------------------
 

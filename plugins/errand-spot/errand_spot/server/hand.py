@@ -12,7 +12,7 @@ from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.spatial.transform import Rotation
 
-from errand_spot.messages import points_of, transform, vector
+from errand_spot.messages import frame_tree, points_of, transform, vector
 from errand_spot.server.arm import USUAL_RAD_S, ArmMotion, Named, Status
 from errand_spot.server.computer import HAND_X_M, Computer, Snapshot, Solver
 from errand_spot.server.leases import ARM
@@ -30,6 +30,8 @@ _FOLLOWING_S: Final = 60.0
 _PER_SEGMENT: Final = 6
 _FARTHEST_M: Final = 2.0
 _FOLDED_RAD, _CLOSE_M, _GAZE_STEP_S = 0.3, 0.05, 0.25
+_STEP_M, _STEP_RAD = 0.2, 0.6
+"""Largest error and turn of a step towards a pose."""
 _TRIES, _SMALL_RAD, _DAMPING, _TURN_WEIGHT, _MOST_OFF_M, _NEAR_M = 15, 1e-4, 1e-3, 0.05, 0.2, 0.02
 """Steps, finite difference, damping and weight of turns for a goal that the hand reaches only turned otherwise."""
 _Positions: Final = arm_command_pb2.NamedArmPositionsCommand
@@ -41,7 +43,7 @@ _Passed = tuple[float, RigidTransform]
 
 
 class Cartesian(ArmMotion):
-    """Moves a tool of the wrist through poses in a frame; a goal out of reach ends it as stalled."""
+    """Moves a tool of the wrist through poses in a frame; towards a goal out of reach as far as the arm can."""
 
     field = "arm_cartesian_feedback"
     _unfolding: Named | None = None
@@ -78,8 +80,7 @@ class Cartesian(ArmMotion):
         """Unfolds a stowed arm, then moves straight from pose to pose, of which those in the world stay there."""
         self._begun_s, arm = computer.clock.now(), computer.capabilities.arm
         q, self._unfolding = computer.arm_rad(), None
-        in_reach = _posture_at(computer, computer.snapshot.X_AB("body", "odom") @ self._X_OW[-1], q) is not None
-        if arm is not None and np.abs(q - np.array(arm.stowed_rad)).max() < _FOLDED_RAD and (self._stays or in_reach):
+        if arm is not None and np.abs(q - np.array(arm.stowed_rad)).max() < _FOLDED_RAD:
             self._unfolding = Named(_Positions.Request(position=_Positions.POSITIONS_READY))
             self._unfolding.begin(computer)
         else:
@@ -90,30 +91,33 @@ class Cartesian(ArmMotion):
         begun_s = self._begun_s
         self._path.append((end_s, X_OW))
         for goal_s, X_OGoal in zip(self._times_s, self._X_OW, strict=True):
-            far_m = float(np.linalg.norm(X_OGoal.translation() - X_OW.translation()))
+            far_m = min(float(np.linalg.norm(X_OGoal.translation() - X_OW.translation())), _FARTHEST_M)
             end_s, X_OW = max(begun_s + goal_s, end_s + 1.5 * far_m / self._fastest_m_s), X_OGoal
             self._path.append((end_s, X_OW))
         self._plan(computer)
 
     def _plan(self, computer: Computer) -> None:
-        """Plans the rest of the path from the present poses of hand and body; stalled unless all of it is in reach."""
+        """Plans the rest of the path from the present poses of hand and body; poses out of reach are approached."""
         self._tracks, self._X_OB, before = False, computer.snapshot.X_AB("odom", "body"), computer.arm_rad()
         X_BO, X_OW, now_s = self._X_OB.inverse(), computer.snapshot.X_AB("odom", "link_wr1"), computer.clock.now()
-        times, postures, time_s = list[float](), list[FloatArray](), 0.0
+        times, postures, time_s, solver = list[float](), list[FloatArray](), 0.0, computer.solver
+        assert solver is not None
         for end_s, X_OGoal in [each for each in self._path[1:] if each[0] > now_s] or self._path[-1:]:
-            far_m = float(np.linalg.norm(X_OGoal.translation() - X_OW.translation()))
+            far_m = min(float(np.linalg.norm(X_OGoal.translation() - X_OW.translation())), _FARTHEST_M)
             goal_s = max(end_s - now_s, time_s + 1.5 * far_m / self._fastest_m_s)
+            self._out_of_reach = _posture_at(computer, X_BO @ X_OGoal, before) is None
             for share in np.linspace(0.0, 1.0, _PER_SEGMENT + 1)[1:]:
-                posture = _posture_at(computer, X_BO @ _between(X_OW, X_OGoal, float(share)), before)
+                X_BW = X_BO @ _between(X_OW, X_OGoal, float(share))
+                posture = _posture_at(computer, X_BW, before)
+                if posture is None and self._out_of_reach:
+                    posture = _turned_posture(solver, X_BW, before, math.inf)
                 if posture is not None:
                     times.append(time_s + share * (goal_s - time_s))
                     postures.append(posture)
                     before = posture
-            if posture is None:
-                self._out_of_reach = True
-                return
+            if self._out_of_reach:
+                break
             X_OW, time_s = X_OGoal, goal_s
-        self._out_of_reach = False
         self._follow(computer, times, postures)
 
     def _track(self, computer: Computer) -> None:
@@ -150,7 +154,7 @@ class Cartesian(ArmMotion):
         X_WG = computer.snapshot.X_AB("link_wr1", frame) @ X_FGoal
         off_m, off_rad = float(np.linalg.norm(X_WG.translation())), X_WG.rotation().ToAngleAxis().angle()
         live = self._stays and self.status == Status.STATUS_PROCESSING
-        done = self.feedback.arm_cartesian_feedback.status == self.complete
+        done = getattr(self.feedback, self.field).status == self.complete
         done &= not live or (off_m < _LOST_M and off_rad < _LOST_RAD)
         off = self._X_OB.InvertAndCompose(computer.snapshot.X_AB("odom", "body"))
         moved = float(np.linalg.norm(off.translation())) > _MOVED_M or off.rotation().ToAngleAxis().angle() > _MOVED_RAD
@@ -161,15 +165,21 @@ class Cartesian(ArmMotion):
             self._plan(computer)
         if live and not done and (moves or moved):
             self.feedback = self._made(self.going)
-        elif self._out_of_reach:
-            self.feedback = self._made(self.stalled)
         elif not done:
             super().tick(computer)
         made = arm_command_pb2.ArmCommand.Feedback()
         made.CopyFrom(self.feedback)
+        self._measure(made, computer.snapshot, off_m, off_rad)
+        self.feedback = made
+
+    def _measure(self, made: Any, _snapshot: Snapshot, off_m: float, off_rad: float) -> None:
+        """Fills in how far the hand is from its goal."""
         made.arm_cartesian_feedback.measured_pos_distance_to_goal = off_m
         made.arm_cartesian_feedback.measured_rot_distance_to_goal = off_rad
-        self.feedback = made
+
+    def _progress(self, computer: Computer) -> int:
+        progress = super()._progress(computer)
+        return self.stalled if self._out_of_reach and progress == self.complete else progress
 
     def _unfolds(self, computer: Computer) -> bool:
         """Goes on unfolding the arm; returns whether it still unfolds."""
@@ -181,6 +191,37 @@ class Cartesian(ArmMotion):
         self._unfolding = None
         self._start(computer)
         return False
+
+
+class Impedance(Cartesian):
+    """Moves a tool along the path of an impedance command, as stiff as the arm is; it presses with no set force."""
+
+    field, _Part = "arm_impedance_feedback", arm_command_pb2.ArmImpedanceCommand.Feedback
+    complete, going, stalled = (
+        _Part.STATUS_TRAJECTORY_COMPLETE,
+        _Part.STATUS_IN_PROGRESS,
+        _Part.STATUS_TRAJECTORY_STALLED,
+    )
+
+    def __init__(self, request: Any, snapshot: Snapshot, now_s: float) -> None:
+        wrench = request.feed_forward_wrench_at_tool_in_desired_tool
+        if any((*vector(wrench.force, "force"), *vector(wrench.torque, "torque"))):
+            raise unsupported("arm_impedance_command with a feed-forward wrench")
+        path = arm_command_pb2.ArmCartesianCommand.Request(
+            root_frame_name=request.root_frame_name, pose_trajectory_in_task=request.task_tform_desired_tool
+        )
+        for name in ("root_tform_task", "wrist_tform_tool"):
+            if request.HasField(name):
+                getattr(path, name).CopyFrom(getattr(request, name))
+        self._frame, self._X_RT = request.root_frame_name, transform(request.root_tform_task, "root_tform_task")
+        super().__init__(path, snapshot, now_s)
+
+    def _measure(self, made: Any, snapshot: Snapshot, off_m: float, off_rad: float) -> None:
+        frames = dict(snapshot.frames)
+        frames["task"] = (self._frame, self._X_RT)
+        frames["tool"] = ("link_wr1", self._X_WT)
+        frames["desired_tool"] = frames["desired_tool_at_end"] = ("odom", self._X_OW[-1] @ self._X_WT)
+        made.arm_impedance_feedback.transforms_snapshot.CopyFrom(frame_tree(frames))
 
 
 class FollowArm(BaseMotion):
@@ -386,7 +427,8 @@ def _turned_posture(
         off = _off(solver.X_BH(q) @ X_HAND, goal)
         steps = _SMALL_RAD * np.eye(len(q))
         J = np.column_stack([off - _off(solver.X_BH(q + step) @ X_HAND, goal) for step in steps]) / _SMALL_RAD
-        q = np.clip(q + J.T @ np.linalg.solve(J @ J.T + _DAMPING * np.eye(6), off), solver.lower_rad, solver.upper_rad)
+        turn = J.T @ np.linalg.solve(J @ J.T + _DAMPING * np.eye(6), _at_most(off, _STEP_M))
+        q = np.clip(q + _at_most(turn, _STEP_RAD), solver.lower_rad, solver.upper_rad)
     return q if np.linalg.norm(_off(solver.X_BH(q) @ X_HAND, goal)[:3]) < most_off_m else None
 
 

@@ -97,7 +97,7 @@ class _ObjectTask(Task):
             return False
         x, y, _ = computer.snapshot.X_AB("body", "odom") @ point_O
         least_m, most_m = arm.comfortable_m
-        if _only_from_above(self._allows):
+        if is_only_from_above(self._allows):
             least_m, most_m = min(arm.nearer_m), max(arm.nearer_m)
         return least_m < math.hypot(x, y) < most_m and abs(math.atan2(y, x)) < _AHEAD_RAD
 
@@ -105,7 +105,7 @@ class _ObjectTask(Task):
         """Pose on the line to a point, facing it at the task's distance from the body's middle."""
         arm, pose, offset_m = computer.capabilities.arm, computer.snapshot.odometry.pose, self._offset_m
         if offset_m is None:
-            above = self._picker is not None and _only_from_above(self._allows)
+            above = self._picker is not None and is_only_from_above(self._allows)
             offset_m = _USUAL_OFFSET_M if arm is None else (arm.nearer_m if above else arm.standing_m)[0]
         x_m, y_m = float(point_O[0]), float(point_O[1])
         yaw_rad = math.atan2(y_m - pose.y_m, x_m - pose.x_m)
@@ -197,7 +197,7 @@ class ManipulationService(Service):
         if mode == Api.PICK_PLAN_ONLY:
             raise InvalidRequestError("walk_gaze_mode: PICK_PLAN_ONLY is not simulated")
         walks = mode in (Api.PICK_WALK_GAZE_UNKNOWN, Api.PICK_AUTO_WALK_AND_GAZE)
-        return _ObjectTask(aim, None, self._picker, _allows(given.grasp_params, snapshot), walks=walks)
+        return _ObjectTask(aim, None, self._picker, grasp_test(given.grasp_params, snapshot), walks=walks)
 
     def _pixel_aim(self, given: Any, _snapshot: Snapshot) -> Aim:
         """Aim of a pixel from the camera's pose in the frames of the request. Raises InvalidRequestError."""
@@ -223,7 +223,7 @@ def _any(_rotation: RotationMatrix) -> bool:
     return True
 
 
-def _allows(params: Any, snapshot: Snapshot) -> Allows:
+def grasp_test(params: Any, snapshot: Snapshot) -> Allows:
     """Returns the test of a grasp's rotation by the parameters. Raises InvalidRequestError."""
     if params.position_constraint == Api.GRASP_POSITION_CONSTRAINT_FIXED_AT_USER_POSITION:
         raise InvalidRequestError("grasp_params.position_constraint: a fixed position is not simulated")
@@ -239,7 +239,7 @@ def _allows(params: Any, snapshot: Snapshot) -> Allows:
     return (lambda R_OH: any(test(R_OH) for test in tests)) if tests else _any
 
 
-def _only_from_above(allows: Allows) -> bool:
+def is_only_from_above(allows: Allows) -> bool:
     """Returns whether the hand may point straight down, and not level with its fingers closing sideways."""
     turns = [RotationMatrix.MakeZRotation(yaw_rad) for yaw_rad in np.linspace(-math.pi, math.pi, 24)]
     down, aside = RotationMatrix.MakeYRotation(0.5 * math.pi), RotationMatrix.MakeXRotation(0.5 * math.pi)

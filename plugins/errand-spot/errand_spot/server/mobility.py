@@ -291,7 +291,8 @@ class Trajectory(_Driving):
             goal = blocked
         if (still or goal == blocked) and goal != part.FINAL_GOAL_STATUS_IN_PROGRESS:
             status = part.STATUS_STOPPED
-        body = part.BODY_STATUS_SETTLED if arrived and still else part.BODY_STATUS_MOVING
+        rests = still and status == part.STATUS_STOPPED
+        body = part.BODY_STATUS_SETTLED if rests else part.BODY_STATUS_MOVING
         self.feedback = self._made(part(status=status, body_movement_status=body, final_goal_status=goal))
 
     def _stuck(self, error: FloatArray, pose: Pose2D, now_s: float) -> bool:
@@ -418,7 +419,10 @@ def mobility_params(request: Any) -> Any:
 
 
 def speed_limit(params: Any) -> Callable[[FloatArray], FloatArray]:
-    """Returns a function that limits velocities (3,) by the parameters, or to usual speeds."""
+    """Returns a function that limits velocities (3,) by the parameters, or to usual speeds.
+
+    It keeps the planar direction; along an axis whose limit is 0 the robot does not move.
+    """
     most, least = np.array([_USUAL_M_S, _USUAL_M_S, _USUAL_RAD_S]), -np.array([_USUAL_M_S, _USUAL_M_S, _USUAL_RAD_S])
     for name, limits in (("max_vel", most), ("min_vel", least)):
         if params.HasField("vel_limit") and params.vel_limit.HasField(name):
@@ -426,4 +430,11 @@ def speed_limit(params: Any) -> Callable[[FloatArray], FloatArray]:
             limits[:] = _velocity(given)
     if most.min() < 0.0 or least.max() > 0.0:
         raise InvalidRequestError("params.vel_limit: max_vel must be at least 0, min_vel at most 0")
-    return lambda velocity: np.clip(velocity, least, most)
+
+    def limit(velocity: FloatArray) -> FloatArray:
+        bound = np.where(velocity > 0.0, most, -least)
+        shares = np.minimum(1.0, bound / np.maximum(np.abs(velocity), 1e-9))
+        shares[:2] = np.where(bound[:2] > 0.0, shares[:2][bound[:2] > 0.0].min(initial=1.0), 0.0)
+        return np.asarray(velocity * shares)
+
+    return limit

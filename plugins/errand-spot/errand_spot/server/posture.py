@@ -14,7 +14,8 @@ from skills.robot import FloatArray, Pose2D
 
 _SHIFT_M, _TWIST_RAD = 0.12, 0.5
 """Largest shift and turn of the body over its feet; a robot clips what is larger, and so does this one."""
-_ROLL_RAD: Final = 0.02
+_ROLL_RAD: Final = 0.15
+"""Largest roll that a command may ask for; the body stays level."""
 _SHIFTED: Final = 0.01
 """Least shift (m) or turn (rad) that counts."""
 
@@ -32,9 +33,7 @@ class Posture:
         self._X_OR: RigidTransform | None = None
         self._times_s, self._poses = [0.0], [RigidTransform([0.0, 0.0, can.standing_height_m])]
         which = control.WhichOneof("param")
-        if which == "body_assist_for_manipulation":
-            raise unsupported("body_control.body_assist_for_manipulation")
-        if which is None:
+        if which in (None, "body_assist_for_manipulation"):
             return
         trajectory, field, X_RN = control.base_offset_rt_footprint, f"body_control.{which}", self._poses[0]
         if which == "body_pose":
@@ -47,7 +46,7 @@ class Posture:
         elif which == "body_pose":
             raise InvalidRequestError(f"{field} has no points")
         if any(abs(RollPitchYaw(X.rotation()).roll_angle()) > _ROLL_RAD for X in self._poses):
-            raise unsupported(f"{field}: a roll of the body")
+            raise unsupported(f"{field}: a roll of the body above {_ROLL_RAD:g} rad")
 
     @property
     def last(self) -> tuple[float, float]:

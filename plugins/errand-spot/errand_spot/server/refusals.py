@@ -11,7 +11,8 @@ from google.protobuf.message import Message
 
 from errand_spot.messages import InvalidRequestError, seconds
 
-LONGEST_S: Final = 600.0
+LONGEST_S: Final = 86400.0
+"""Farthest time ahead that a command may name."""
 _Answer = robot_command_pb2.RobotCommandResponse
 _MOST, _LEAST, _YEARS_S, _SLACK = 1e7, 1e-3, 3.15576e11, 1e-6
 """Largest value of a number, least value of a limit, longest duration of a message, and tolerance of ranges."""

@@ -11,7 +11,7 @@ from typing import Final
 
 import grpc
 
-from errand_spot.server import docking, identity, manipulation, pictures, rays, state
+from errand_spot.server import docking, identity, manipulation, pictures, rays, state, streams
 from errand_spot.server.calls import Service, handlers
 from errand_spot.server.commands import PowerService, RobotCommandService
 from errand_spot.server.computer import Computer, Pace, Solver
@@ -39,8 +39,6 @@ LISTED: Final[Mapping[str, str]] = {
     "payload-registration": "bosdyn.api.PayloadRegistrationService",
     "recording-service": "bosdyn.api.graph_nav.GraphNavRecordingService",
     "robot-command-streaming": "bosdyn.api.RobotCommandStreamingService",
-    "robot-mission": "bosdyn.api.mission.MissionService",
-    "robot-state-streaming": "bosdyn.api.RobotStateStreamingService",
     "spot-check": "bosdyn.api.spot.SpotCheckService",
 }
 """Services of a real Spot in the directory that answer UNIMPLEMENTED."""
@@ -48,8 +46,8 @@ SERVICES: Final = tuple(sorted(Service.__subclasses__(), key=lambda service: ser
 """Services that are served."""
 MOTIONS: Final = (
     "stand with height, pitch, turn and shift, sit, velocity, trajectory, follow arm, stance, stop, freeze, safe power "
-    "off, self-right; the arm's joint moves, named positions, Cartesian moves, gaze, velocity and stop; the gripper. "
-    "Others are refused as unsupported."
+    "off, self-right; the arm's joint moves, named positions, Cartesian moves, impedance without force, gaze, velocity "
+    "and stop; the gripper. Others are refused as unsupported."
 )
 """The motions of `RobotCommand`, in words."""
 _DESCRIBED_IN: Final = (
@@ -59,6 +57,7 @@ _DESCRIBED_IN: Final = (
     *("docking.docking", "manipulation_api", "ray_cast", "log_status.log_status", "spot.inverse_kinematics"),
     "keepalive.keepalive",
     "graph_nav.graph_nav",
+    "mission.mission",
 )
 """Files of the SDK that describe the services; importing them registers their descriptions."""
 
@@ -163,6 +162,8 @@ class SpotServer:
             state.PayloadService(),
             state.DataBufferService(),
             state.LogStatusService(),
+            streams.RobotStateStreamingService(computer),
+            streams.MissionService(),
             GraphNavService(computer, leases, clocks, options.perception, live),
         ]
         return [service for service in made if service.name not in lacking]

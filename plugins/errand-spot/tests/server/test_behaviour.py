@@ -15,12 +15,12 @@ import pytest
 from bosdyn.api import basic_command_pb2, estop_pb2, manipulation_api_pb2, robot_command_pb2, robot_state_pb2
 from bosdyn.client.docking import blocking_undock
 from bosdyn.client.exceptions import InvalidRequestError, ResponseError
+from bosdyn.client.graph_nav import GraphNavClient, RobotImpairedError
 from bosdyn.client.robot_command import RobotCommandBuilder as Build
 from bosdyn.geometry import EulerZXY
 from bosdyn.util import seconds_to_duration
 
 from errand_spot.server.computer import Pace
-from errand_spot.server.graph_nav import _impaired
 
 PACE, SHARED = Pace.CLIENT, True
 Fault = robot_state_pb2.BehaviorFault
@@ -120,7 +120,9 @@ def test_a_robot_that_has_fallen_does_not_dock_pick_or_navigate(spot):
     request = {"walk_to_object_ray_in_world": {"frame_name": "odom", "ray_end_rt_frame": {"x": 1.0}}}
     with pytest.raises(InvalidRequestError, match="has fallen"):
         client.manipulation_api_command(manipulation_api_pb2.ManipulationApiRequest(**request))
-    impaired = _impaired(spot.served.server.computer)
+    with pytest.raises(RobotImpairedError) as refused:
+        spot.robot.ensure_client(GraphNavClient.default_service_name).navigate_to("a", 5.0)
+    impaired = refused.value.response.impaired_state
     assert impaired.impaired_status == impaired.IMPAIRED_STATUS_BEHAVIOR_FAULT and len(impaired.behavior_faults) == 1
 
 

@@ -39,7 +39,7 @@ def test_a_malformed_message_is_an_invalid_argument_without_a_traceback(channel,
 
 @pytest.mark.parametrize(
     "path",
-    ["/bosdyn.api.mission.MissionService/PlayMission", "/bosdyn.api.PowerService/ResetSafetyStop", "/no.Such/Call"],
+    ["/bosdyn.api.mission.MissionService/LoadMission", "/bosdyn.api.PowerService/ResetSafetyStop", "/no.Such/Call"],
 )
 def test_a_call_that_is_not_served_is_named(channel, path):
     refused = refusal(channel.unary_unary(path, as_is, as_is), b"")

@@ -19,7 +19,7 @@ from google.protobuf.wrappers_pb2 import FloatValue
 from pydrake.math import RotationMatrix
 
 from errand_spot.server.computer import Pace
-from errand_spot.server.manipulation import _allows, _only_from_above
+from errand_spot.server.manipulation import grasp_test, is_only_from_above
 from errand_spot.server.rays import first_hit_m
 from tests.tables import table
 
@@ -260,18 +260,18 @@ def test_a_grasp_from_above_is_told_from_one_from_the_side(spot):
 
     def aligned(axis, to):
         axes = {"axis_on_gripper_ewrt_gripper": axis, "axis_to_align_with_ewrt_frame": to}
-        return _allows(oriented(vector_alignment_with_tolerance={**axes, "threshold_radians": 0.17}), snapshot)
+        return grasp_test(oriented(vector_alignment_with_tolerance={**axes, "threshold_radians": 0.17}), snapshot)
 
     top, side = aligned({"x": 1}, {"z": -1}), aligned({"y": 1}, {"z": 1})
     down, rolled = RotationMatrix.MakeYRotation(math.pi / 2), RotationMatrix.MakeXRotation(math.pi / 2)
     assert (top(down), top(rolled), side(down), side(rolled)) == (True, False, False, True)
-    either = _allows(Api.GraspParams(), snapshot)
-    assert list(map(_only_from_above, (top, side, either))) == [True, False, False]
+    either = grasp_test(Api.GraspParams(), snapshot)
+    assert list(map(is_only_from_above, (top, side, either))) == [True, False, False]
 
 
 def test_a_rotation_with_tolerance_allows_rotations_near_it(spot):
     down = {"rotation_ewrt_frame": {"w": math.sqrt(0.5), "y": math.sqrt(0.5)}, "threshold_radians": 0.2}
-    allows = _allows(oriented(rotation_with_tolerance=down), spot.served.server.computer.snapshot)
+    allows = grasp_test(oriented(rotation_with_tolerance=down), spot.served.server.computer.snapshot)
     rotations = [RotationMatrix.MakeYRotation(math.pi / 2 + off_rad) for off_rad in (0.15, 0.25)]
     assert list(map(allows, rotations)) == [True, False]
 

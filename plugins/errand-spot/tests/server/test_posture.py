@@ -121,17 +121,22 @@ ASSIST.body_control.body_assist_for_manipulation.enable_hip_height_assist = True
 MOON = body_pose((0.0, SE3Pose(0.0, 0.0, 0.5, Quat())), root="moon")
 
 
+@pytest.mark.parametrize("params", [ASSIST, turned(0.0, roll=0.05)], ids=["assist", "small roll"])
+def test_the_robot_stands_level_when_asked_for_an_assist_or_a_small_roll(spot, params):
+    stood(spot, params)
+    assert (spot.served.scripted.height_m, *body(spot)) == pytest.approx((0.52, 0.0, 0.0, 0.0), abs=0.01)
+
+
 # what the body cannot do -> what the refusal names
 @pytest.mark.parametrize(
     ("command", "params", "error", "said"),
     [
         (Build.synchro_stand_command(), turned(0.0, roll=0.2), rc.UnsupportedError, "roll"),
-        (Build.synchro_stand_command(), ASSIST, rc.UnsupportedError, "body_assist"),
         (Build.synchro_stand_command(), MOON, rc.UnknownFrameError, "moon"),
         (Build.synchro_stand_command(), body_pose(), rc.InvalidRequestError, "no points"),
         (WALK, turned(0.3), rc.UnsupportedError, "during a walk"),
     ],
-    ids=["roll", "assist", "frame", "no points", "turned walk"],
+    ids=["roll", "frame", "no points", "turned walk"],
 )
 def test_the_robot_refuses_a_posture_that_its_body_cannot_take(spot, command, params, error, said):
     command.synchronized_command.mobility_command.params.Pack(params)

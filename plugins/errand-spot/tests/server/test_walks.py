@@ -71,6 +71,18 @@ def test_a_closed_square_is_walked_along_its_corners_in_time(spot, frame):
     assert at_4_s[:2] == pytest.approx((0.5, 0.5), abs=0.08)
 
 
+@pytest.mark.parametrize(("goal", "limits"), [((1.2, 0.4), {}), ((0.3, 1.2), {"x": 0.2, "y": 0.6})])
+def test_a_goal_is_walked_to_on_the_straight_line(spot, goal, limits):
+    params = spot_command_pb2.MobilityParams()
+    if limits:
+        params.vel_limit.max_vel.linear.CopyFrom(geometry_pb2.Vec2(**limits))
+        params.vel_limit.max_vel.angular = 1.0
+    spot.served.scripted.blocks.clear()
+    poses, _ = walked(spot, sent(spot, path([(*goal, 0.8)], params=params)))
+    off_m = np.abs(poses[:, 0] * goal[1] - poses[:, 1] * goal[0]) / np.hypot(*goal)
+    assert off_m.max() < 0.04 and poses[-1, :2] == pytest.approx(goal, abs=0.03)
+
+
 def test_a_way_out_and_back_is_walked_though_it_ends_where_it_begins(spot):
     poses, _ = walked(spot, sent(spot, path([(0.6, 0.0, 0.0), (0.0, 0.0, 0.0)], (2.0, 4.0))))
     assert poses[:, 0].max() == pytest.approx(0.6, abs=0.06)
@@ -96,7 +108,7 @@ def test_a_walk_into_a_wall_stops_before_it_and_is_blocked(spot):
     poses, told = walked(spot, number)
     standing = np.flatnonzero(np.abs(np.diff(poses[:, 0])) < 0.002)
     assert told.final_goal_status == Walk.FINAL_GOAL_STATUS_BLOCKED
-    assert told.body_movement_status == Walk.BODY_STATUS_MOVING  # settled means: at the goal
+    assert told.body_movement_status == Walk.BODY_STATUS_SETTLED
     assert 0.9 < spot.served.scripted.pose.x_m < 1.7 - 0.56
     assert 0.1 * len(standing) < 3.0
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 import time
 from collections.abc import Iterator
@@ -14,10 +15,12 @@ from typing import Final
 from errand_ros2.adapter.clocks import RobotClock, SimulatedClock
 from errand_ros2.adapter.description import load_description
 from errand_ros2.adapter.robot import Ros2Robot
-from errand_ros2.wire.node import Node, Place, open_session
+from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 from skills.inputs.errors import InputError
 from skills.robot import ConnectedRobot, RobotStoppedError
 
+_LOG: Final = logging.getLogger(__name__)
 _NAME: Final = "errand_driver"
 _NAMESPACE: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 _PATIENCE_S, _TICK_S = 10.0, 0.05
@@ -28,7 +31,7 @@ class Ros2:
     """A robot of ROS 2 below a namespace; implements `skills.stack.RobotBackend`.
 
     `file` is its description, by default that of a robot of `kind` that `errand serve-ros2` serves. `network` is the
-    domain and the router, as for `--ros2`: `[DOMAIN][@HOST[:PORT]]`.
+    domain and the wire, as for `--ros2`.
     """
 
     file: Path | None = None
@@ -44,15 +47,16 @@ class Ros2:
         place, description = Place.parse(self.network), load_description(self.file, self.kind)
         with open_session(place) as session:
             clock = SimulatedClock() if description.file.sim_time else RobotClock()
-            node = Node(session, _NAME, f"/{space}")
+            node = session.node(_NAME, f"/{space}")
             if isinstance(clock, SimulatedClock):
                 node.subscribe("/clock", "rosgraph_msgs/msg/Clock", clock.hear_clock)
             robot, ready, until_s = Ros2Robot(name, node, clock, description), Event(), time.monotonic() + _PATIENCE_S
             while (missing := robot.missing() if clock.is_heard else "/clock") and time.monotonic() < until_s:
                 Event().wait(_TICK_S)
             if missing:
-                hint = "is the robot on, with RMW_IMPLEMENTATION=rmw_zenoh_cpp, in this domain and at this router?"
-                raise InputError(f"ros2://{space}: nothing is heard on {missing}", hint=hint)
+                what = f"ros2://{space}: nothing is heard on {missing} ({session.told})"
+                raise InputError(what, hint="is the robot on, in this domain, with this middleware?")
+            _LOG.warning("ROS 2: /%s, %s", space, session.told)
 
             def look() -> None:
                 robot.poll()
@@ -61,6 +65,6 @@ class Ros2:
 
             clock.after = look
             try:
-                yield ConnectedRobot(robot, clock, ready.set, robot.notes(f"ros2://{space}", session.place.endpoint))
+                yield ConnectedRobot(robot, clock, ready.set, robot.notes(f"ros2://{space}", session.told))
             finally:
                 robot.return_lease(robot.take_lease(_NAME))

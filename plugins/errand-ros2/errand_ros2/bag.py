@@ -22,7 +22,7 @@ from errand_ros2.messages import Fields
 from errand_ros2.wire.types import ros_types
 from executive.record.history import Event
 from executive.record.other_tools import body_frame, ros_name
-from executive.record.schemas import DERIVED, GRID
+from executive.words.schemas import DERIVED, GRID
 from skills.inputs.outside import writing
 
 VIEWER_COPIES: Final = DERIVED - {GRID}

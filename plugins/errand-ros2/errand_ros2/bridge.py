@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -20,10 +21,11 @@ from errand_ros2.driving import Driving
 from errand_ros2.goals import Goals
 from errand_ros2.messages import Fields
 from errand_ros2.part_actions import PartActions
-from errand_ros2.readings import TOPIC, pose_on_map
+from errand_ros2.readings import pose_on_map
 from errand_ros2.robot_topics import Frames, RobotTopics
 from errand_ros2.tree_topic import TreeTopic
-from errand_ros2.wire.node import Node, Place, Publisher, open_session
+from errand_ros2.wire.node import Node, Place, Publisher
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import LATCHED, Qos
 from executive.app.prepare.prepared import Prepared
 from executive.app.runs.backend import Observe
@@ -37,6 +39,8 @@ from executive.tree.compiler import CompiledTree
 from skills.api import LocalisationEstimate, ParticleView, SearchingLocaliser, SkillContext
 from skills.grid_map import GridMap, load_grid_map
 
+_LOG: Final = logging.getLogger(__name__)
+_STATES: Final = {True: {"id": 3, "label": "active"}, False: {"id": 2, "label": "inactive"}}  # of a lifecycle node
 _EVENTS: Final = frozenset({"transitions", "control", "outcome", "speech", "errors", "object_to_detect"})
 """Topics of the log whose messages are published as events."""
 _TOPICS: Final = {
@@ -56,7 +60,7 @@ _LATE_S, _CHEST_M, _HALF_M = 0.5, 1.2, 3.0  # delay not caught up; height of peo
 
 
 def observe(value: str) -> Observe:
-    """Returns the observer for `--ros2 [DOMAIN][@HOST[:PORT]]`. Raises InputError for another value."""
+    """Returns the observer for `--ros2`, whose value `Place.parse` reads. Raises InputError for another value."""
     place = Place.parse(value)
     return lambda prepared, control: Bridge(prepared, control, place)
 
@@ -88,8 +92,9 @@ class Bridge(RunVisitor):
         """Opens the session; velocities die by the clock `life` (s). Raises InputError."""
         self._open, self._control, self._life, self._hurry = ExitStack(), control, life, threading.Event()
         self.session = self._open.enter_context(open_session(place))
+        _LOG.warning("ROS 2: %s", self.session.told)
         self._pool = self._open.enter_context(ThreadPoolExecutor(1, thread_name_prefix="errand-ros2"))
-        self._node = Node(self.session, "errand")
+        self._node = self.session.node("errand")
         self._node.claim("/clock")
         self._clock = self._node.publisher("/clock", "rosgraph_msgs/msg/Clock")
         self._diagnostics = self._node.publisher("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
@@ -104,7 +109,7 @@ class Bridge(RunVisitor):
 
     def _robot(self, prepared: Prepared) -> _RobotBridge:
         name = prepared.mission.robot_name
-        node = Node(self.session, "errand", f"/{ros_name(name)}")
+        node = self.session.node("errand", f"/{ros_name(name)}")
         node.claim("odom")
         out = {topic: node.publisher(topic, kind, Qos(10, "errand_msgs" in kind)) for topic, kind in _TOPICS.items()}
 
@@ -124,7 +129,11 @@ class Bridge(RunVisitor):
         drive = node.later(self._pool, lambda stamped: own.goals.accept("goal_pose", None, [stamped]))
         node.subscribe("goal_pose", "geometry_msgs/msg/PoseStamped", drive)
         node.subscribe("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", own.initial.append)
-        node.subscribe(TOPIC, "geometry_msgs/msg/Twist", own.driving.hear, late_s=own.driving.late_s)
+        own.driving.listen(node, lambda: 0.0 if own.context is None else own.context.clock.now())
+        for name in ("amcl", "bt_navigator"):  # whose states nav2_simple_commander awaits
+            node.answer(
+                f"{name}/get_state", "lifecycle_msgs/srv/GetState", lambda _: {"current_state": _STATES[own.is_active]}
+            )
 
     def _obey(self, name: str, what: str, _: Any) -> Fields:
         """Answers a service by its command to a robot, or by the reason why it is refused."""

@@ -1,4 +1,4 @@
-"""`errand ros2 bag` converts the log of a run to a ROS 2 bag; `errand serve-ros2` serves a simulated robot."""
+"""`errand ros2` writes bags and interface packages; `errand serve-ros2` serves a simulated robot."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from executive.cli.number_options import quantity_option
 from executive.cli.options import START, start_pose
 from executive.cli.output import new_folder
 from executive.record.history import read_history
+from skills.inputs.outside import writing
 from skills.quantities import Delay, Seed
 
-ros2 = typer.Typer(name="ros2", help="Logs as ROS 2 bags.", no_args_is_help=True, rich_markup_mode=None)
+ros2 = typer.Typer(name="ros2", help="Bags, and interface packages.", no_args_is_help=True, rich_markup_mode=None)
 
 
 @ros2.callback()
 def _group() -> None:
-    """Logs as ROS 2 bags."""
+    """Bags, and interface packages."""
 
 
 @ros2.command()
@@ -42,10 +43,21 @@ def bag(
     typer.echo(f"{count} messages in {out}", err=True)
 
 
+@ros2.command()
+def interfaces(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder, such as src of a workspace.")],
+    package: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Only this one; repeatable.")] = None,
+) -> None:
+    """Writes packages of the interfaces that Errand uses and ROS 2 may lack, for colcon or CMake to build."""
+    from errand_ros2.packages import PACKAGES, write_packages
+
+    with writing(folder, "name another folder"):
+        write_packages(folder, package := package or PACKAGES)
+    typer.echo(f"{', '.join(package)} in {folder}; build them by colcon build", err=True)
+
+
 def serve_ros2(
-    place: Annotated[
-        str, typer.Argument(metavar="[DOMAIN][@HOST[:PORT]]", help="ROS domain, and address of the Zenoh router.")
-    ] = "",
+    place: Annotated[str, typer.Argument(metavar="[WIRE:][DOMAIN][@HOST[:PORT]]", help="Network, as of --ros2.")] = "",
     world: Annotated[str, typer.Option("--world", help="A world by name or folder.")] = "flat",
     robot: Annotated[str, typer.Option("--robot", help="Name of the robot; in lower case its namespace.")] = "Alice",
     kind: Annotated[str, typer.Option("--kind", help="Kind of the robot.")] = "spot",
@@ -54,13 +66,14 @@ def serve_ros2(
     with_map: Annotated[bool, typer.Option("--map", help="Publish the world's map as /map, too.")] = False,
     truth: Annotated[bool, typer.Option("--ground-truth", help="Publish the true pose under /ground_truth.")] = False,
     limit: Annotated[
-        float | None, quantity_option(Delay, "--for", help="End after this time (s) on the robot's clock.")
+        float | None, quantity_option(Delay, "--for", help="End after so long (s, robot's clock).")
     ] = None,
 ) -> None:
     """Serves a simulated robot in ROS 2, without navigation, until Ctrl-C."""
     from errand_ros2.adapter.description import capabilities_of
     from errand_ros2.server import RobotServer
-    from errand_ros2.wire.node import Place, open_session
+    from errand_ros2.wire.node import Place
+    from errand_ros2.wire.session import open_session
     from errand_ros2.wire.types import topic_name
     from executive.app.prepare.placed_robots import only_robot, refuse_blocked
     from executive.app.prepare.worlds import open_world
@@ -76,14 +89,9 @@ def serve_ros2(
     with open_session(at) as session:
         compile_first()
         simulation = simulate(opened, {robot: placed}, seed=seed, record=False)
-        server = RobotServer(
-            session,
-            simulation.robots[robot],
-            simulation.clock,
-            grid=load_grid_map(opened.scan_map_path) if with_map else None,
-            truth=(lambda: simulation.engine.poses_W()[robot]) if truth else None,
-        )
-        router = "the router is here" if session.is_router else "by its router"
-        typer.echo(f"ROS 2: {space}, domain {at.domain}, {at.endpoint} ({router}; Ctrl-C ends it)")
+        grid = load_grid_map(opened.scan_map_path) if with_map else None
+        X_WB = (lambda: simulation.engine.poses_W()[robot]) if truth else None
+        server = RobotServer(session, simulation.robots[robot], simulation.clock, grid=grid, truth=X_WB)
+        typer.echo(f"ROS 2: {space}, {session.told}; Ctrl-C ends it")
         with closing(server), suppress(KeyboardInterrupt):
             server.run(Event(), limit)

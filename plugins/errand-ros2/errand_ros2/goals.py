@@ -17,9 +17,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from py_trees.common import Status
+from pydrake.math import RigidTransform
 
 from errand_ros2 import messages
 from errand_ros2.readings import pose_on_map
+from errand_ros2.robot_topics import frames_on_body
 from errand_ros2.wire.actions import ActionServer, Goal, GoalStatus
 from errand_ros2.wire.node import Node
 from executive.app.prepare.prepared import Prepared
@@ -72,9 +74,9 @@ class Goals:
         self._name = prepared.mission.robot_name
         self._numbers, self._lock = count(1), threading.RLock()
         self._pursued: dict[str, _Pursued] = {}
-        self._frames: Mapping[str, Pose2D] = {}
+        self._frames: Mapping[str, RigidTransform] = {}
         self._due_s = -math.inf
-        self._odom = f"{node.namespace.strip('/')}/odom"
+        self._space = node.namespace.strip("/")
         make = partial(ActionServer, node, pool=pool, cancel=self._cancel)
         self._actions = {
             name: make(name, kind, accept=partial(self._accept_goal, name)) for name, kind in _ACTIONS.items()
@@ -140,7 +142,9 @@ class Goals:
 
     def tick(self, context: SkillContext, progress: Progress) -> None:
         """Publishes feedback twice a second."""
-        self._frames = {self._odom: Pose2D.from_transform(context.localiser.estimate().X_WO)}
+        X_WB, space = context.X_WB(), self._space
+        frames = {f"{space}/{name}": X_WB @ X_BF for name, X_BF in frames_on_body(context.robot).items()}
+        self._frames = {**frames, f"{space}/odom": context.localiser.estimate().X_WO}
         if (now_s := context.clock.now()) < self._due_s:
             return
         self._due_s = now_s + FEEDBACK_PERIOD_S

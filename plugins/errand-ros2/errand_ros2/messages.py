@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
@@ -18,6 +19,8 @@ from skills.footprint import clearance_on_grid
 from skills.grid_map import GridMap
 from skills.robot import Battery, FloatArray, Image, Imu, Intrinsics, Joints, Odometry, Pose2D, Scan
 
+_PREFIX: Final = re.compile(r"[<\s](\w+):\w")
+_NAMESPACES: Final = {"drake": "http://drake.mit.edu", "xacro": "http://ros.org/wiki/xacro"}
 MAP_FRAME: Final = "map"  # it equals the frame "world" of logs
 LEAST_RANGE_M, MOST_RANGE_M, _FLOAT32 = 0.05, 100.0, 7  # the last is a type of sensor_msgs/PointField
 MOST_COLUMNS: Final = 320  # raw pictures of a run are reduced to at most so many columns
@@ -25,6 +28,9 @@ _UNKNOWN: Final = np.array([-1.0, *[0.0] * 8])  # covariance of what is not meas
 _CELL_M, _DECAY_M = 0.1, 0.3  # cells of a costmap; where costs fall to 1/e
 _SPHERE, _TEXT, _DELETE_ALL = 2, 9, 3  # types and an action of visualization_msgs/Marker
 _MARKER_M, _GREEN = 0.12, {"r": 0.1, "g": 0.7, "b": 0.2, "a": 0.8}
+_ODOMETRY_VARIANCES: Final = (4e-4, 4e-4, 1e-4, 1e-4, 1e-4, 1e-3)  # m², rad²: 2 cm and 2 degrees after some metres
+_VELOCITY_VARIANCES: Final = (4e-4, 4e-4, 1e-4, 1e-4, 1e-4, 4e-4)  # m²/s², rad²/s²
+_RATE_VARIANCE, _ACCELERATION_VARIANCE = 1e-4, 1e-2  # rad²/s², m²/s⁴
 Fields = dict[str, Any]  # values of a message by field
 
 
@@ -67,9 +73,18 @@ def moved(head: Fields, child: str, at: Mapping[str, Any]) -> Fields:
     return {"header": head, "child_frame_id": child, "transform": values}
 
 
+def well_formed(urdf: str) -> str:
+    """Returns a URDF whose root declares each prefix that it uses, as XML asks and Drake does not."""
+    used = sorted({each for each in _PREFIX.findall(urdf) if each in _NAMESPACES and f"xmlns:{each}" not in urdf})
+    declared = "".join(f' xmlns:{each}="{_NAMESPACES[each]}"' for each in used)
+    return re.sub(r"<robot\b", f"<robot{declared}", urdf, count=1)
+
+
 def odometry(reading: Odometry, frame: str, body: str) -> Fields:
-    """Returns the robot's dead reckoning."""
-    at, moving = {"pose": pose(reading.X_OB)}, {"twist": twist(reading.velocity)}
+    """Returns the robot's dead reckoning; what it does not measure has a covariance so large that none counts it."""
+    spread, moved = np.diag(_ODOMETRY_VARIANCES), np.diag(_VELOCITY_VARIANCES)
+    at, moving = {"pose": pose(reading.X_OB), "covariance": spread.ravel()}, twist(reading.velocity)
+    moving = {"twist": moving, "covariance": moved.ravel()}
     return {"header": header(reading.stamp_s, frame), "child_frame_id": body, "pose": at, "twist": moving}
 
 
@@ -116,7 +131,9 @@ def points(reading: Scan, frame: str) -> Fields:
 def imu(reading: Imu, frame: str) -> Fields:
     """Returns turn rates and accelerations; the orientation is not measured."""
     rates, accelerations = vector(reading.angular_velocity_B), vector(reading.linear_acceleration_B)
+    spreads = {"angular_velocity": _RATE_VARIANCE, "linear_acceleration": _ACCELERATION_VARIANCE}
     unknown = {"orientation": {"w": 1.0}, "orientation_covariance": _UNKNOWN}
+    unknown |= {f"{name}_covariance": (each * np.eye(3)).ravel() for name, each in spreads.items()}
     head = header(reading.stamp_s, frame)
     return {"header": head, **unknown, "angular_velocity": rates, "linear_acceleration": accelerations}
 

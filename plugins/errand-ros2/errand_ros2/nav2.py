@@ -12,7 +12,8 @@ import numpy as np
 from errand_ros2.messages import MAP_FRAME, pose_stamped
 from errand_ros2.readings import planar_pose
 from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError
-from errand_ros2.wire.node import Node, Place, open_session
+from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 from skills.api import FreeSpace, PlanningError
 from skills.footprint import Footprint, footprint_clearance_m, pose_array
 from skills.geometry import compose, inverse
@@ -53,16 +54,17 @@ class Nav2:
         here, there = (pose_stamped(0.0, MAP_FRAME, X_MB) for X_MB in poses_M)
         asked = {"start": here, "goal": there, "use_start": True, "planner_id": self.planner_id}
         with open_session(Place.parse(self.network)) as session:
-            client = ActionClient(Node(session, "errand_planner"), self.action, _ACTION)
+            client = ActionClient(session.node("errand_planner"), self.action, _ACTION)
             try:
                 sent = client.send(asked, limit_s=self.limit_s)
             except NoAnswerError as error:
-                raise PlanningError(f"no Nav2 answers on {self.action}, which the stack file names") from error
+                raise PlanningError(f"no Nav2 is active on {self.action} of the stack file ({session.told})") from error
             if sent is None or not sent.ended.wait(self.limit_s):
                 raise PlanningError(f"Nav2 on {self.action} does not plan within {self.limit_s:g} s")
         result = sent.result
         if sent.status is not GoalStatus.SUCCEEDED:
-            raise PlanningError(f"Nav2 finds no path: {result.error_msg[:200] or result.error_code}")
+            why, code = (getattr(result, each, "") for each in ("error_msg", "error_code"))  # which Humble lacks
+            raise PlanningError(f"Nav2 finds no path: {why[:200] or code}")
         try:
             found = [compose(X_WM, planar_pose(each.pose)) for each in result.path.poses]
         except InputError as error:

@@ -13,13 +13,15 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
 
 from errand_ros2.messages import MAP_FRAME
-from skills.geometry import compose
+from errand_ros2.wire.node import Node
 from skills.grid_map import GridMap
 from skills.inputs.errors import InputError
 from skills.robot import Capabilities, Imu, Intrinsics, Joints, Odometry, Pose2D, Scan
 
 FRAMES: Final = frozenset({MAP_FRAME, "world"})  # names of the map's frame
 TOPIC: Final = "cmd_vel"
+_TWIST, _STAMPED = (f"geometry_msgs/msg/{each}" for each in ("Twist", "TwistStamped"))
+_SINCE_1970_S: Final = 1e9  # stamps beyond are of the wall clock
 LIFE_S: Final = 0.2  # time after which a velocity no longer counts; then the robot stands
 STILL: Final = ((0.0, 0.0, 0.0), -math.inf)
 _SHORTEST_QUATERNION, _LONGEST_QUATERNION = 0.1, 1e6
@@ -44,18 +46,20 @@ def planar_pose(pose: Any) -> Pose2D:
     return Pose2D.from_transform(transform_of(pose.position, pose.orientation))
 
 
-def pose_on_map(stamped: Any, grid: GridMap, frames: Mapping[str, Pose2D]) -> Pose2D:
+def pose_on_map(stamped: Any, grid: GridMap, frames: Mapping[str, RigidTransform]) -> Pose2D:
     """Reads geometry_msgs/PoseStamped as a pose on the map; `frames` are the poses of other frames on it.
 
-    Raises InputError for an unknown frame, a pose off the map, and what `planar_pose` refuses.
+    Raises InputError for an unknown frame, a pose off the map or in an obstacle of it, and what `planar_pose` refuses.
     """
-    frame, pose = stamped.header.frame_id.strip("/"), planar_pose(stamped.pose)
+    frame, X_FP = stamped.header.frame_id.strip("/"), transform_of(stamped.pose.position, stamped.pose.orientation)
     if frame not in FRAMES and frame not in frames:
         raise InputError(f"there is no frame '{frame[:60]}'", hint=f"known: {', '.join(sorted({*FRAMES, *frames}))}")
-    placed = pose if frame in FRAMES else compose(frames[frame], pose)
-    least = np.array(grid.origin_m)
+    placed = Pose2D.from_transform(X_FP if frame in FRAMES else frames[frame] @ X_FP)
+    least, at = np.array(grid.origin_m), f"({placed.x_m:.6g}, {placed.y_m:.6g})"
     if not (np.all(least <= (placed.x_m, placed.y_m)) and np.all((placed.x_m, placed.y_m) <= least + grid.size_m)):
-        raise InputError(f"({placed.x_m:.6g}, {placed.y_m:.6g}) is not on the map", hint="name a pose on it")
+        raise InputError(f"{at} is not on the map", hint="name a pose on it")
+    if grid.distance_m(np.array([[placed.x_m, placed.y_m]]))[0] <= 0.0:
+        raise InputError(f"{at} lies in an obstacle of the map", hint="name a free pose")
     return placed
 
 
@@ -77,7 +81,8 @@ def within_limits(velocity: tuple[float, float, float], can: Capabilities) -> tu
 class HeardVelocity:
     """Last velocity of a topic, and when it came on the clock `now` (s). Any thread may call `hear`.
 
-    One that is `late_s` late by the wall clock does not count; on another clock than the wall's, none is late.
+    One that is `late_s` late by the wall clock does not count; on another clock than the wall's, none is late. Of
+    those with a stamp, one that is older than `LIFE_S` on its clock, the robot's or the wall's, does not count either.
     """
 
     def __init__(self, now: Callable[[], float]) -> None:
@@ -88,10 +93,26 @@ class HeardVelocity:
         read = usable(velocity, twist)
         self.last = STILL if read is None else (read, self._now())
 
+    def listen(self, node: Node, robot_now: Callable[[], float]) -> None:
+        """Takes velocities of a node's topic with and without a stamp; `robot_now` is the robot's clock (s)."""
+
+        def hear_stamped(message: Any) -> None:
+            if abs(age_s(message.header, robot_now())) <= LIFE_S:
+                self.hear(message.twist)
+
+        node.subscribe(TOPIC, _TWIST, self.hear, late_s=self.late_s)
+        node.subscribe(TOPIC, _STAMPED, hear_stamped, late_s=self.late_s)
+
 
 def stamp_of(header: Any) -> float:
     """Returns the time of a message (s)."""
     return float(header.stamp.sec) + 1e-9 * float(header.stamp.nanosec)
+
+
+def age_s(header: Any, robot_now_s: float) -> float:
+    """Returns the age of a stamp on its clock, the robot's or the wall's; 0 without a stamp."""
+    sent_s = stamp_of(header)
+    return 0.0 if sent_s == 0.0 else (time.time() if sent_s > _SINCE_1970_S else robot_now_s) - sent_s
 
 
 def odometry(message: Any, stamp_s: float, raised_m: float) -> Odometry:

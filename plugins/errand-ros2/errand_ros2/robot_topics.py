@@ -7,15 +7,18 @@ from contextlib import suppress
 from functools import partial
 from typing import Final
 
+import numpy as np
 from pydrake.math import RigidTransform
 
 from errand_ros2 import messages
 from errand_ros2.messages import MOST_COLUMNS, Fields
 from errand_ros2.wire.node import Node
 from errand_ros2.wire.types import LATCHED, SENSOR, Qos
+from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import CameraCapabilities, Image, Mount, NoImageError, Robot
 
 IMAGE_PERIOD_S, BATTERY_PERIOD_S, _EPSILON_S = 0.2, 1.0, 1e-6
+_FRAMES: Final = ("odom", "body", "lidar", "hand")
 _IMAGE, _INFO, _COMPRESSED = (f"sensor_msgs/msg/{each}" for each in ("Image", "CameraInfo", "CompressedImage"))
 _PICTURES: Final[Mapping[bool, Mapping[str, tuple[str, Callable[[Image, str, int], Fields]]]]] = {
     False: {
@@ -24,9 +27,9 @@ _PICTURES: Final[Mapping[bool, Mapping[str, tuple[str, Callable[[Image, str, int
         "image/compressed": (_COMPRESSED, messages.compressed),
     },
     True: {
-        "depth": (_IMAGE, messages.depth),
+        "depth/image": (_IMAGE, messages.depth),
         "depth/camera_info": (_INFO, partial(messages.camera_info, of_depth=True)),
-        "depth/compressedDepth": (_COMPRESSED, messages.compressed_depth),
+        "depth/image/compressedDepth": (_COMPRESSED, messages.compressed_depth),
     },
 }
 """Topics of a camera, without and with depth: their types, and how their messages are made."""
@@ -57,6 +60,22 @@ class _Stream:
         self.out = [(node.publisher(f"{camera.source}/{name}", kind, SENSOR), make) for name, (kind, make) in topics]
 
 
+def frames_on_body(robot: Robot) -> dict[str, RigidTransform]:
+    """Returns the poses in the body of all frames that the robot carries, by name."""
+    can, at = robot.capabilities(), robot.joints().position_rad
+    found = {"body": RigidTransform(), "base_link": RigidTransform()}
+    mounts = {Mount.BODY: found["body"]}
+    if can.arm is not None and at.keys() >= {*can.arm.joint_names}:
+        found["hand"] = mounts[Mount.HAND] = arm_model(can).X_BH(np.array([at[name] for name in can.arm.joint_names]))
+    if can.head is not None:
+        mounts[Mount.HEAD] = can.head.X_BF(*(at.get(name, 0.0) for name in can.head.joint_names))
+    for each in can.cameras:
+        if each.mount in mounts:
+            found[f"{each.source}_camera"] = X_BF = mounts[each.mount] @ each.X_FC
+            found[f"{each.source}_camera_optical"] = X_BF
+    return found if (scan := robot.scan()) is None else {**found, "lidar": scan.X_BL}
+
+
 class RobotTopics:
     """Publishers of one robot's readings. `publish` reads the robot, and must be called where its verbs may be."""
 
@@ -65,7 +84,7 @@ class RobotTopics:
         self._robot, self._frames = robot, frames
         self._most_columns, self.image_period_s = most_columns, IMAGE_PERIOD_S
         space = node.namespace.strip("/")
-        self._odom_frame, self._body, self._lidar = (f"{space}/{each}" for each in ("odom", "body", "lidar"))
+        self._odom_frame, self._body, self._lidar, self._hand = (f"{space}/{each}" for each in _FRAMES)
         self._odom = node.publisher("odom", "nav_msgs/msg/Odometry")
         self._joints = node.publisher("joint_states", "sensor_msgs/msg/JointState")
         self._imu = node.publisher("imu", "sensor_msgs/msg/Imu", SENSOR)
@@ -75,10 +94,13 @@ class RobotTopics:
         self._holding = node.publisher("gripper/holding", "std_msgs/msg/Bool")
         self._force = node.publisher("gripper/force", "geometry_msgs/msg/WrenchStamped")
         abilities = robot.capabilities()
-        node.publisher("robot_description", "std_msgs/msg/String", LATCHED).put({"data": abilities.description})
+        urdf = {"data": messages.well_formed(abilities.description)}
+        node.publisher("robot_description", "std_msgs/msg/String", LATCHED).put(urdf)
         self._streams = [_Stream(node, each, depth) for each in abilities.cameras for depth in (False, True)]
         on_body = [each for each in self._streams if each.camera.mount is Mount.BODY]
         frames.fix(*(messages.transform(0.0, self._body, each.frame, each.camera.X_FC) for each in on_body))
+        others = {f"{space}/base_link": self._body, **{f"{each.frame}_optical": each.frame for each in self._streams}}
+        frames.fix(*(messages.transform(0.0, frame, name, RigidTransform()) for name, frame in others.items()))
         self.stamps_s: dict[str, float] = {}
         """Times of the last odometry and scan that were published, by topic."""
         self._battery_due_s = 0.0
@@ -95,7 +117,9 @@ class RobotTopics:
         if self._robot.capabilities().gripper is not None:
             gripper = self._robot.gripper()
             self._holding.put({"data": gripper.holding})
-            head = messages.header(gripper.stamp_s, self._body)
+            head = messages.header(gripper.stamp_s, self._hand)
+            if (X_BH := frames_on_body(self._robot).get("hand")) is not None:
+                moving.append(messages.transform(stamp_s, self._body, self._hand, X_BH))
             self._force.put({"header": head, "wrench": {"force": {"z": gripper.force_n}}})
         if (imu := self._robot.imu()) is not None:
             self._imu.put(messages.imu(imu, self._body))

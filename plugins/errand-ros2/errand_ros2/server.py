@@ -14,9 +14,9 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from errand_ros2 import messages
 from errand_ros2.part_actions import MOST_S, PartActions
-from errand_ros2.readings import LIFE_S, TOPIC, HeardVelocity, transform_of, within_limits
+from errand_ros2.readings import LIFE_S, HeardVelocity, transform_of, within_limits
 from errand_ros2.robot_topics import Frames, RobotTopics
-from errand_ros2.wire.node import Node, Session
+from errand_ros2.wire.node import Session
 from errand_ros2.wire.types import LATCHED
 from executive.record.other_tools import ros_name
 from skills.grid_map import GridMap
@@ -45,7 +45,7 @@ class RobotServer:
         self._robot, self._clock, self._truth, self._life = robot, clock, truth, life
         self._lease = robot.acquire_lease("the server of ROS 2")
         space = f"/{ros_name(robot.name)}"
-        top, self.node = Node(session, "robot"), Node(session, "robot", space)
+        top, self.node = session.node("robot"), session.node("robot", space)
         top.claim("/clock", f"{space}/odom")
         self._time = top.publisher("/clock", "rosgraph_msgs/msg/Clock")
         if grid is not None:
@@ -56,7 +56,7 @@ class RobotServer:
         self.parts = PartActions(self.node, robot, clock, lambda: self._lease)
         self.work = self.parts.work
         self._velocity = HeardVelocity(life)
-        self.node.subscribe(TOPIC, "geometry_msgs/msg/Twist", self._velocity.hear, late_s=self._velocity.late_s)
+        self._velocity.listen(self.node, clock.now)
         self._driving: CommandId | None = None
         if (can := robot.capabilities()).gripper is not None:
             carry = partial(robot.carry, lease=self._lease)

@@ -2,6 +2,7 @@
 
 import shutil
 from contextlib import closing
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -23,6 +24,8 @@ from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import ScriptedRobot, Start
 
 START = Pose2D(1.0, -0.5, 0.3)
+collect_ignore = [] if find_spec("rclpy") and find_spec("nav2_msgs") else ["test_rclpy.py"]
+"""What `make ros` brings the means for."""
 
 
 @pytest.fixture(scope="session")

@@ -1,12 +1,17 @@
-"""Figures of the ROS 2 plug-in: `python plugins/errand-ros2/tests/ros2_benchmarks.py bridge|cancel|kill [COUNT]`.
+"""Figures of the ROS 2 plug-in: `python plugins/errand-ros2/tests/ros2_benchmarks.py NAME [COUNT]`.
 
 bridge: a run in the flat with one subscription to scan, tf and a picture for COUNT seconds: rates, pace, latency, CPU.
 cancel: COUNT goals of navigate_to_pose, each cancelled under way: time until the base stands.
 kill: a process that sends cmd_vel is killed COUNT times: time until the base of the served robot stands.
+With the Python of `make ros`, two processes and a client with rclpy alone:
+rclpy: COUNT goals of navigate_to_pose of a run, each cancelled under way, and as many that are reached.
+bytes: COUNT random bytes to each input of a run and of a served robot: what moves, and what is said.
+base: COUNT missions with --robot ros2://alice on the base of rclpy_base.py, judged by where it stands at the end.
 """
 
 import json
 import math
+import os
 import signal
 import socket
 import subprocess
@@ -15,6 +20,7 @@ import tempfile
 import threading
 import time
 import uuid
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -22,14 +28,15 @@ import numpy as np
 
 from errand_ros2.bridge import Bridge
 from errand_ros2.server import RobotServer
-from errand_ros2.wire.node import Client, Node, Place, open_session
+from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import ActionType, Attachment, ros_types
+from executive import Request
 from executive.app.prepare.from_request import prepare
 from executive.app.prepare.placed_robots import only_robot
 from executive.app.prepare.worlds import open_world
 from executive.app.runs.one_run import run_request
 from executive.app.runs.simulated import simulate
-from executive.mission.request import Request
 from executive.run.control import Control
 
 HEARD = {"/alice/scan": "sensor_msgs/msg/LaserScan", "/tf": "tf2_msgs/msg/TFMessage"}
@@ -77,7 +84,7 @@ def listen(port, limit_s):
     """Listens for a while, in a process of its own; prints counts, the way of the clock, and latencies as JSON."""
     delays, clock, counts = [], [], dict.fromkeys(HEARD, 0)
     with open_session(Place(port=port)) as session:
-        node, kept = Node(session, "listener"), []
+        node, kept = session.node("listener"), []
 
         def hear(topic, kind, sample):
             counts[topic] += 1
@@ -116,7 +123,7 @@ class Watch:
     """The speed of the base as another program sees it."""
 
     def __init__(self, session):
-        self.node, self.seen = Node(session, "watch"), []
+        self.node, self.seen = session.node("watch"), []
         self.node.subscribe("/alice/odom", ODOM, self._hear)
 
     def _hear(self, message):
@@ -155,7 +162,7 @@ def cancel(count):
         with open_session(place) as session:
             watch, base, rows, reached = Watch(session), "/alice/navigate_to_pose/_action", [], 0
             names = {"send_goal": action.send_goal, "get_result": action.get_result, "cancel_goal": action.cancel_goal}
-            send, result, stop = (Client(watch.node, f"{base}/{name}", kind) for name, kind in names.items())
+            send, result, stop = (watch.node.client(f"{base}/{name}", kind) for name, kind in names.items())
             watch.wait_for(-1.0, 120.0)
             for number in range(2 * count):
                 x, y, yaw = GOALS[number // 2 % 2]
@@ -183,13 +190,13 @@ def cancel(count):
 
 SENDER = """
 import sys, time
-from errand_ros2.wire.node import Node
-from errand_ros2.wire.node import Place, open_session
+from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import ActionType, ros_types
 
 with open_session(Place(port=int(sys.argv[1]))) as session:
     kind = "geometry_msgs/msg/Twist"
-    publisher, twist = Node(session, "sender").publisher("/alice/cmd_vel", kind), ros_types().make(kind)
+    publisher, twist = session.node("sender").publisher("/alice/cmd_vel", kind), ros_types().make(kind)
     twist.linear.x, twist.angular.z = 0.4 * int(sys.argv[2]), 0.5
     while True:
         publisher.put(twist)
@@ -224,6 +231,118 @@ def kill(count):
     tell(rows, 0.6)
 
 
+DOMAIN, START = 90, ("9.3", "4.05", "1.57")
+
+
+class RclpyWatch(Watch):
+    """The speed of the base as a program with rclpy alone sees it."""
+
+    def __init__(self, client):
+        self.seen = []
+        client.hear("/alice/odom", ODOM, handle=self._hear)
+
+
+def by_rclpy(count):
+    from rclpy_client import client_of, errand, interface, stamped
+
+    kind, rows, reached = "nav2_msgs/action/NavigateToPose", [], 0
+    words = ("run", "--say", "wait for an hour", "--world", "flat", "--start", *START, "--no-record", "--quiet")
+    with (
+        tempfile.TemporaryDirectory() as out,
+        errand(*words, "--out", out, "--ros2", f"rclpy:{DOMAIN}", ready="ROS 2: "),
+        client_of(DOMAIN) as client,
+    ):
+        watch, navigate = RclpyWatch(client), client.action("/alice/navigate_to_pose", kind)
+        watch.wait_for(-1.0, 120.0)
+        for number in range(2 * count):
+            goal = interface(kind).Goal()
+            goal.pose = stamped(*GOALS[number // 2 % 2][:2])
+            sent = client.send(navigate, goal)
+            assert sent.accepted
+            if number % 2 == 0:
+                watch.wait_for(0.25)
+                time.sleep(0.5)
+                now = time.monotonic(), watch.seen[-1][1]
+                client.result_of(sent.cancel_goal_async())
+                time.sleep(1.0)
+                rows.append(watch.still_after(*now))
+            else:
+                reached += client.result_of(sent.get_result_async(), 120.0).status == 4
+    sys.stdout.write(f"{reached} of {count} goals reached\n")
+    tell(rows, 0.2)
+
+
+INPUTS = {
+    **{"goal_pose": "geometry_msgs/msg/PoseStamped", "initialpose": "geometry_msgs/msg/PoseWithCovarianceStamped"},
+    **{"cmd_vel": TWIST, "body_pose": "geometry_msgs/msg/Pose", "gripper/carry": "std_msgs/msg/Bool"},
+    "say": "std_msgs/msg/String",
+}
+
+
+def random_bytes(count):
+    from rclpy_client import client_of, errand, interface
+
+    words = ("--world", "flat", "--start", *START)
+    run = ("run", "--say", "wait for an hour", *words, "--no-record", "--quiet", "--ros2", f"rclpy:{DOMAIN}")
+    chance = np.random.default_rng(1)
+    for command in (run, ("serve-ros2", f"rclpy:{DOMAIN}", *words)):
+        with errand(*command, ready="ROS 2: ") as said, client_of(DOMAIN) as client:
+            seen, sent = client.hear("/alice/odom", ODOM), 0
+            time.sleep(8.0)
+            begun = seen[-1].pose.pose.position
+            for topic, kind in INPUTS.items():
+                out, left = client.node.create_publisher(interface(kind), f"/alice/{topic}", 10), count
+                time.sleep(0.5)
+                while left > 0 and out.get_subscription_count():
+                    data = b"\0\1\0\0" + chance.bytes(int(chance.integers(0, 600)))
+                    left -= len(data)
+                    if kind != TWIST or len(data) < 52:  # from there on random bytes are a velocity
+                        with suppress(RuntimeError):  # longer than the type's messages are
+                            out.publish(data)
+                            sent += 1
+                    time.sleep(0.0005)
+            time.sleep(1.0)
+            ended = seen[-1].pose.pose.position
+            moved_m = math.dist((begun.x, begun.y), (ended.x, ended.y))
+            fastest = max(each.twist.twist.linear.x for each in seen)
+            wrong = [line for line in said if "Traceback" in line]
+            sys.stdout.write(f"{command[0]}: {sent} messages, {moved_m:.3f} m, at most {fastest:.2f} m/s, ")
+            sys.stdout.write(f"{len(wrong)} tracebacks, {len(said)} lines; the last: {said[-1]}")
+
+
+BASE = """
+kind: fetch
+base: {command: cmd_vel, stamped: true, speed: 0.5, turn_rate: 1.0}
+odometry: {topic: odom, raised: 0.377}
+joints: null
+lidar: {scan: scan}
+"""
+"""Description of the base of rclpy_base.py, which has no arm."""
+
+
+def base(count):
+    world = open_world("flat")
+    grid, rooms = world.folder / "map" / "low_scan.yaml", ["kitchen", "office", "bedroom", "hall", "workshop"]
+    for number in range(count):
+        room, domain = rooms[number % len(rooms)], DOMAIN + 1 + number
+        with tempfile.TemporaryDirectory() as folder:
+            (file := Path(folder) / "base.yaml").write_text(BASE)
+            words = [sys.executable, Path(__file__).with_name("rclpy_base.py"), grid, *START]
+            environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
+            driven = subprocess.Popen(words, env=environment, stdout=subprocess.PIPE, text=True)
+            run = ["run", "--say", f"go to the {room}", "--world", "flat", "--no-record", "--quiet", "--out", folder]
+            robot = ["--robots", f"alice=fetch@{','.join(START)}", "--seed", str(number + 1)]
+            address = f"ros2://alice?file={file}&network=rclpy:{domain}"
+            words = [sys.executable, "-m", "executive.cli", *run, *robot, "--robot", address]
+            ended = subprocess.run(words, capture_output=True, text=True, timeout=300, check=False)
+            driven.send_signal(signal.SIGINT)
+            x, y, _ = map(float, driven.communicate()[0].split()[-3:])
+        off_m = math.dist((x, y), world.standing[room])
+        sys.stdout.write(f"{room}: exit code {ended.returncode}, {off_m:.2f} m from where a robot stands there\n")
+
+
 if __name__ == "__main__":
     what, *numbers = sys.argv[1:]
-    {"bridge": bridge, "cancel": cancel, "kill": kill, "listen": listen}[what](*map(int, numbers or [60]))
+    measures = {"bridge": bridge, "cancel": cancel, "kill": kill, "listen": listen}
+    measures |= {"rclpy": by_rclpy, "bytes": random_bytes, "base": base}
+    measures[what](*map(int, numbers or [60]))

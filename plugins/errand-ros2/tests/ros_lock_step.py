@@ -11,7 +11,8 @@ from errand_ros2.adapter.clocks import RobotClock
 from errand_ros2.adapter.description import described, served_file
 from errand_ros2.adapter.robot import Ros2Robot
 from errand_ros2.server import PERIOD_S, RobotServer
-from errand_ros2.wire.node import Client, Node, Publisher, open_session
+from errand_ros2.wire.session import open_session
+from errand_ros2.wire.zenoh_node import ZenohClient, ZenohPublisher
 from plant.robots.spot.kind import spot_capabilities
 from skills.testing.blocks import Block
 from skills.testing.clock import VirtualClock
@@ -58,7 +59,7 @@ class LockStep(RobotClock):
         if self._failure is not None:
             raise self._failure
         session = self._ending.enter_context(open_session(place))
-        self.node = Node(session, "driver", f"/{name.lower()}")
+        self.node = session.node("driver", f"/{name.lower()}")
         self.robot = Ros2Robot(name, self.node, self, described(file or served_file(kind)))
         topics = self.server.topics
         assert soon(lambda: self.robot._velocity.is_heard and topics._odom.is_heard and topics._joints.is_heard)
@@ -114,7 +115,7 @@ class LockStep(RobotClock):
     @contextmanager
     def cut(self):
         """Loses every message of both sides while the block lasts; the clocks go on."""
-        ways = (Publisher, "put"), (Client, "call"), (Client, "ask")
+        ways = (ZenohPublisher, "put"), (ZenohClient, "call"), (ZenohClient, "ask")
         kept = {way: getattr(*way) for way in ways}
         for kind, name in ways:
             setattr(kind, name, lambda *_, **__: None)

@@ -18,13 +18,13 @@ from ros_client import free_port, soon
 from ros_lock_step import restore, state_of
 
 from errand_ros2.bridge import Bridge
-from errand_ros2.wire.node import Client, Node, Place, open_session
+from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import ActionType, ros_types
+from executive import Request
 from executive.app.prepare.from_request import prepare
 from executive.app.runs.one_run import run_request
-from executive.mission.request import Request
 from executive.run.control import Control
-from executive.run.control_state import Mode
 from executive.run.visitor import RunEntry
 from executive.testing.bench import write_small_room
 from plant.robots.spot.kind import spot_capabilities
@@ -50,6 +50,39 @@ HEARD = {
     "/alice/global_costmap/costmap": "nav_msgs/msg/OccupancyGrid",
     "/alice/particle_cloud": "nav2_msgs/msg/ParticleCloud",
 }
+
+IMAGE, INFO = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo"
+TOPICS = {
+    "/clock": "rosgraph_msgs/msg/Clock",
+    "/tf": "tf2_msgs/msg/TFMessage",
+    "/alice/odom": "nav_msgs/msg/Odometry",
+    "/alice/joint_states": "sensor_msgs/msg/JointState",
+    "/alice/imu": "sensor_msgs/msg/Imu",
+    "/alice/scan": "sensor_msgs/msg/LaserScan",
+    "/alice/points": "sensor_msgs/msg/PointCloud2",
+    "/alice/battery_state": "sensor_msgs/msg/BatteryState",
+    "/alice/gripper/holding": "std_msgs/msg/Bool",
+    "/alice/gripper/force": "geometry_msgs/msg/WrenchStamped",
+    "/ground_truth/alice/pose": "geometry_msgs/msg/PoseStamped",
+    **{f"/alice/{each.source}/image": IMAGE for each in spot_capabilities().cameras},
+    **{f"/alice/{each.source}/depth/image": IMAGE for each in spot_capabilities().cameras},
+    **{
+        f"/alice/{each.source}/image/compressed": "sensor_msgs/msg/CompressedImage"
+        for each in spot_capabilities().cameras
+    },
+    **{
+        f"/alice/{each.source}/depth/image/compressedDepth": "sensor_msgs/msg/CompressedImage"
+        for each in spot_capabilities().cameras
+    },
+    **{f"/alice/{each.source}/camera_info": INFO for each in spot_capabilities().cameras},
+    **{f"/alice/{each.source}/depth/camera_info": INFO for each in spot_capabilities().cameras},
+}
+STORED = {
+    "/map": "nav_msgs/msg/OccupancyGrid",
+    "/tf_static": "tf2_msgs/msg/TFMessage",
+    "/alice/robot_description": "std_msgs/msg/String",
+}
+"""Topics of which a late subscription gets the last message."""
 
 
 class CloudPlace(KnownPlace):
@@ -136,7 +169,7 @@ class RosClient:
 
     def __init__(self, session, bridge, backend=None):
         self.node, self.place, self.bridge, self.heard = (
-            Node(session, "client"),
+            session.node("client"),
             session.place,
             bridge,
             defaultdict(list),
@@ -183,7 +216,7 @@ class RosClient:
         return [each["what"] for each in self.events("control")]
 
     def call(self, name):
-        return Client(self.node, f"/alice/{name}", ros_types().service(TRIGGER)).call({}, limit_s=PATIENCE_S)
+        return self.node.client(f"/alice/{name}", ros_types().service(TRIGGER)).call({}, limit_s=PATIENCE_S)
 
     def publisher(self, topic, kind):
         made = self.node.publisher(topic, kind)
@@ -210,7 +243,7 @@ class RosClient:
         for name, kind in ACTIONS.items():
             ActionClient(self, name, kind).cancel(every=True)
         control = self.bridge._control
-        if control.state.robots["Alice"].mode is not Mode.RUNNING:
+        if control.state.robots["Alice"].mode.value != "running":
             self.call("resume")
         self.soon(lambda: len(control.state.missions["Alice"]) == 1 and self.still())
         self.step(3)
@@ -230,9 +263,9 @@ class ActionClient:
     def __init__(self, ros, name, kind=None):
         self.ros, self.kind = ros, ActionType(ros_types(), kind or ACTIONS[name])
         base = f"/alice/{name}/_action"
-        self._send = Client(ros.node, f"{base}/send_goal", self.kind.send_goal)
-        self._result = Client(ros.node, f"{base}/get_result", self.kind.get_result)
-        self._cancel = Client(ros.node, f"{base}/cancel_goal", self.kind.cancel_goal)
+        self._send = ros.node.client(f"{base}/send_goal", self.kind.send_goal)
+        self._result = ros.node.client(f"{base}/get_result", self.kind.get_result)
+        self._cancel = ros.node.client(f"{base}/cancel_goal", self.kind.cancel_goal)
         self._feedback, self.feedback = f"{base}/feedback", []
         self.identity = {"uuid": np.frombuffer(uuid.uuid4().bytes, np.uint8)}
         self.goal = ros_types().make(f"{self.kind.name}_Goal")

@@ -14,7 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from errand_ros2.bag import GRID, VIEWER_COPIES, write_bag, write_bag_file
 from executive.record.history import read_history
-from executive.record.schemas import DERIVED
+from executive.words.schemas import DERIVED
 from skills.inputs.errors import InputError
 
 

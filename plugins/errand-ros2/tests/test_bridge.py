@@ -28,7 +28,6 @@ from ros_run import (
 
 from errand_ros2.bridge import observe
 from errand_ros2.wire.actions import GoalStatus
-from errand_ros2.wire.node import Client
 from errand_ros2.wire.types import LATCHED, older_types, ros_types
 from executive.run.control import Control
 from skills.inputs.errors import InputError
@@ -94,7 +93,7 @@ def test_a_client_of_an_older_distribution_gets_the_result_in_its_form(ros):
     assert older.key != action.kind.get_result.key
     action.goal.pose = stamped(0.3, 0.0)
     assert action.send()
-    client = Client(ros.node, "/alice/navigate_to_pose/_action/get_result", older)
+    client = ros.node.client("/alice/navigate_to_pose/_action/get_result", older)
     result = ros.meanwhile(lambda: client.call({"goal_id": action.identity}, limit_s=60.0))
     assert (result.status, result.result.error_code) == (GoalStatus.SUCCEEDED, 0)
     assert not hasattr(result.result, "error_msg")
@@ -116,7 +115,7 @@ def test_a_goal_of_navigate_through_poses_passes_them_in_order(ros):
 def test_a_client_of_jazzy_sends_poses_in_its_form(ros):
     send = older_types().service(f"{THROUGH}_SendGoal")
     identity = {"uuid": np.frombuffer(uuid.uuid4().bytes, np.uint8)}
-    client = Client(ros.node, "/alice/navigate_through_poses/_action/send_goal", send)
+    client = ros.node.client("/alice/navigate_through_poses/_action/send_goal", send)
     poses = [stamped(0.3, 0.0), stamped(0.3, -0.3)]
     assert client.call({"goal_id": identity, "goal": {"poses": poses}}, limit_s=20.0).accepted
     ros.soon(lambda: ros.events("outcome"))
@@ -138,7 +137,7 @@ def test_detections_are_boxes_in_pixels(ros):
 
 def test_a_viewer_asks_for_the_tree_and_sees_its_changes(ros):
     kind = "py_trees_ros_interfaces/srv/OpenSnapshotStream"
-    opened = Client(ros.node, "/alice/tree/snapshot_streams/open", ros_types().service(kind)).call({}, limit_s=5.0)
+    opened = ros.node.client("/alice/tree/snapshot_streams/open", ros_types().service(kind)).call({}, limit_s=5.0)
     heard = ros.hear(opened.topic_name, "py_trees_ros_interfaces/msg/BehaviourTree", LATCHED)
     ros.soon(lambda: heard)
     assert [each.name for each in heard[0].behaviours if each.is_active][-1].startswith("wait")
@@ -204,6 +203,16 @@ def test_a_cancelled_goal_stops_the_robot(ros):
     assert "cancelled by its client" in result.result.error_msg
 
 
+# Frames of a goal half a metre ahead and to the left of the body, whose yaw is 0 there.
+@pytest.mark.parametrize("frame", ["alice/odom", "alice/body", "/alice/base_link"])
+def test_a_goal_in_a_frame_of_the_robot_is_where_that_frame_has_it(ros, frame):
+    here, action = ros.robot.pose, ActionClient(ros, "navigate_to_pose")
+    action.goal.pose = stamped(-0.5, 0.5, frame=frame)
+    assert action.send()
+    assert action.result().status == GoalStatus.SUCCEEDED
+    assert (ros.robot.pose.x_m - here.x_m, ros.robot.pose.y_m - here.y_m) == pytest.approx((-0.5, 0.5), abs=0.1)
+
+
 def test_a_new_goal_takes_the_place_of_the_one_before(ros):
     first, second = (ActionClient(ros, "navigate_to_pose") for _ in range(2))
     first.goal.pose, second.goal.pose = stamped(0.6, -1.2), stamped(-0.6, 1.2)
@@ -214,9 +223,9 @@ def test_a_new_goal_takes_the_place_of_the_one_before(ros):
     assert ros.robot.pose.y_m == pytest.approx(1.2, abs=0.15)
 
 
-def test_a_goal_in_an_obstacle_fails_with_its_cause_and_no_motion(ros):
+def test_a_goal_too_near_to_an_obstacle_fails_with_its_cause_and_no_motion(ros):
     action = ActionClient(ros, "navigate_to_pose")
-    action.goal.pose = stamped(1.5, 0.0)  # under the table
+    action.goal.pose = stamped(1.1, 0.0)  # just before the table
     assert action.send()
     result = action.result()
     assert result.status == GoalStatus.ABORTED
@@ -229,6 +238,7 @@ def test_a_goal_in_an_obstacle_fails_with_its_cause_and_no_motion(ros):
     [
         (stamped(math.nan, 0.0), "not finite"),
         (stamped(1e9, 0.0), "not on the map"),
+        (stamped(1.5, 0.0), "in an obstacle"),  # under the table
         (stamped(0.0, 0.0, frame="mars"), "no frame 'mars'"),
         (stamped(0.0, 0.0, w=0.0), "quaternion"),
     ],
@@ -284,12 +294,50 @@ def arm_goal(ros, seconds):
 
 
 def test_a_trajectory_moves_the_arm_while_the_mission_is_paused(ros):
-    action = arm_goal(ros, 1)
+    action = arm_goal(ros, 1).follow()
     assert action.send()
     result = action.result()
     assert (result.status, result.result.error_code) == (GoalStatus.SUCCEEDED, 0)
     assert ros.robot.q_rad == pytest.approx(ARM_RAD, abs=0.02)
+    told = [each.feedback.actual.positions for each in action.feedback]
+    assert len(told) >= 8 and told[-1] == pytest.approx(ARM_RAD, abs=0.3)
     ros.soon(lambda: ros.controls() == ["pause", "resume"])
+
+
+def test_a_trajectory_whose_stamp_has_passed_goes_on_from_where_it_would_be_and_one_that_has_ended_is_rejected(ros):
+    now_s, late = ros.robot.joints().stamp_s, arm_goal(ros, 3)
+    late.goal.trajectory.header.stamp.sec = int(now_s) - 1
+    begun_s = ros.bridge.now()
+    assert late.send()
+    assert late.result().status == GoalStatus.SUCCEEDED
+    assert ros.bridge.now() - begun_s < 2.8
+    ended = arm_goal(ros, 1)
+    ended.goal.trajectory.header.stamp.sec = 1 + int(ros.bridge.now()) - 5
+    assert not ended.send()
+
+
+@pytest.mark.parametrize("frame", ["alice/base_link", "alice/frontleft_camera_optical", "alice/hand", "alice/lidar"])
+def test_a_goal_in_any_frame_that_the_robot_carries_is_accepted(ros, frame):
+    action = ActionClient(ros, "navigate_to_pose")
+    action.goal.pose = stamped(0.0, 0.0, frame)
+    assert action.send()
+
+
+@pytest.mark.parametrize("name", ["/amcl", "/alice/amcl", "/bt_navigator", "/alice/bt_navigator"])
+def test_nodes_of_nav2_are_active_while_a_mission_lasts(ros, name):
+    kind = ros_types().service("lifecycle_msgs/srv/GetState")
+    assert ros.node.client(f"{name}/get_state", kind).call({}, limit_s=5.0).current_state.label == "active"
+
+
+def test_the_force_of_the_gripper_is_told_in_the_frame_of_the_hand(ros):
+    force, tf = (
+        ros.hear("/alice/gripper/force", "geometry_msgs/msg/WrenchStamped"),
+        ros.hear("/tf", "tf2_msgs/msg/TFMessage"),
+    )
+    ros.soon(lambda: force and tf)
+    assert force[-1].header.frame_id == "alice/hand"
+    (hand,) = (each for each in tf[-1].transforms if each.child_frame_id == "alice/hand")
+    assert hand.header.frame_id == "alice/body" and hand.transform.translation.x != 0.0
 
 
 def test_a_trajectory_of_other_joints_is_rejected(ros):
@@ -309,11 +357,11 @@ def test_a_cancelled_trajectory_stops_the_arm(ros):
 
 def test_the_gripper_is_opened_and_tells_its_opening(ros):
     action = PartClient(ros, "gripper_controller/gripper_cmd", "control_msgs/action/GripperCommand")
-    action.goal.command.position = 0.8
+    action.goal.command.position = -0.8  # the joint's angle, as in joint_states
     assert action.send()
     result = action.result()
     assert result.status == GoalStatus.SUCCEEDED
-    assert (result.result.position, result.result.reached_goal) == (pytest.approx(0.8, abs=0.02), True)
+    assert (result.result.position, result.result.reached_goal) == (pytest.approx(-0.8, abs=0.02), True)
 
 
 def test_velocities_do_not_drive_the_robot_into_a_wall(ros):

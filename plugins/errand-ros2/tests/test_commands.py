@@ -83,4 +83,4 @@ def test_a_simulated_robot_is_served_for_a_while():
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     told = done("serve-ros2", f"7@127.0.0.1:{port}", "--for", "0.5", "--robot", "Bob", "--map", "--ground-truth")
-    assert told.stdout == f"ROS 2: /bob, domain 7, tcp/127.0.0.1:{port} (the router is here; Ctrl-C ends it)\n"
+    assert told.stdout == f"ROS 2: /bob, domain 7, Zenoh at tcp/127.0.0.1:{port} (the router is here); Ctrl-C ends it\n"

@@ -21,7 +21,7 @@ from zenoh_ros2_sdk import ROS2Publisher, ROS2ServiceClient, ROS2Subscriber
 from zenoh_ros2_sdk.discovery import get_service_names_and_types, get_topic_info, get_topic_names_and_types
 
 from errand_ros2.wire.actions import GoalStatus
-from errand_ros2.wire.node import open_session
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import LATCHED
 from tests.tables import yaml_beside
 
@@ -123,19 +123,20 @@ def test_the_independent_client_hears_every_topic_of_a_run(run_and_topics):
     assert heard["/alice/object_destination"].goal_y == 2.0
     assert len(heard["/alice/particle_cloud"].particles) == 2
     assert heard["/alice/navigate_through_poses/_action/feedback"].feedback.number_of_poses_remaining == 2
-    assert {each.child_frame_id for each in heard["/tf"].transforms} == {"alice/body", "alice/odom"}
+    assert {each.child_frame_id for each in heard["/tf"].transforms} == {"alice/body", "alice/odom", "alice/hand"}
 
 
 def test_the_independent_client_lists_every_topic_and_service_of_a_run(ros):
     published = documented("Published") | action_topics()
     taken = {f"{space}/{name}": kind for name, kind in TAKEN.items() for space in ("", "/alice")}
     taken["/alice/say"] = "std_msgs/msg/String"
-    for name, kind in PART_ACTIONS.items():  # they tell no feedback
+    for name, kind in PART_ACTIONS.items():
         base = f"/alice/{name}/_action"
         taken |= {f"{base}/feedback": f"{kind}_FeedbackMessage", f"{base}/status": "action_msgs/msg/GoalStatusArray"}
 
     listed = dict(get_topic_names_and_types(router_port=ros.place.port))
-    assert listed == {topic: [kind] for topic, kind in (published | taken).items()}
+    velocities = {key: [TAKEN["cmd_vel"], "geometry_msgs/msg/TwistStamped"] for key in ("/cmd_vel", "/alice/cmd_vel")}
+    assert listed == {topic: [kind] for topic, kind in (published | taken).items()} | velocities
     for topic, kind in published.items():
         told = get_topic_info(topic, router_port=ros.place.port, verbose=True)
         (publisher,) = told.publishers

@@ -1,6 +1,7 @@
 """Messages from a robot's readings: what the readings say, in the units and conventions of ROS 2."""
 
 import math
+from xml.etree import ElementTree
 
 import cv2
 import numpy as np
@@ -83,6 +84,20 @@ def test_a_compressed_picture_shows_the_same(colour, shape):
     pixels = cv2.imdecode(told.data, cv2.IMREAD_UNCHANGED)
     assert pixels.shape == shape
     assert np.abs(pixels.astype(int) - np.array([50, 100, 200] if colour else 7)).max() <= 3
+
+
+@pytest.mark.parametrize(
+    ("urdf", "declared"),
+    [
+        ('<robot name="a"><drake:joint/></robot>', '<robot xmlns:drake="http://drake.mit.edu" name="a">'),
+        ('<robot name="a"><mesh/></robot>', '<robot name="a">'),
+        ('<robot xmlns:drake="own"><drake:joint/></robot>', '<robot xmlns:drake="own">'),
+    ],
+)
+def test_a_description_declares_the_prefixes_that_it_uses(urdf, declared):
+    told = messages.well_formed(urdf)
+    assert told.startswith(declared)
+    assert ElementTree.fromstring(told).tag == "robot"
 
 
 def test_unknown_depth_is_nan():

@@ -14,12 +14,13 @@ from ros_client import free_port
 from errand_ros2 import messages
 from errand_ros2.nav2 import Nav2
 from errand_ros2.wire.actions import ActionServer, GoalStatus
-from errand_ros2.wire.node import Node, Place, open_session
+from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 from executive.testing.bench import SkillBench
+from executive.tree.registry import installed_skills
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import PlanningError, Running, Succeeded
 from skills.footprint import Footprint
-from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
 from skills.stack import default_stack
 from skills.testing.clock import VirtualClock
@@ -44,7 +45,7 @@ def nav2(poses, *, error="", answers=True):
                 pool.submit(server.end, goal, status, **result)
             return True
 
-        node, kind = Node(session, "planner_server", "/alice"), "nav2_msgs/action/ComputePathToPose"
+        node, kind = session.node("planner_server", "/alice"), "nav2_msgs/action/ComputePathToPose"
         server = ActionServer(node, "compute_path_to_pose", kind, accept=accept, cancel=lambda _: None, pool=pool)
         made = {"action": "/alice/compute_path_to_pose", "network": f"@:{place.port}"}
         yield lambda **options: Nav2(**made, **options), goals
@@ -93,8 +94,8 @@ def test_the_robot_drives_along_the_path_of_nav2():
     detour = [(0.0, 0.0, 0.8), (0.5, 0.5, 0.8), (1.0, 1.0, 0.0), (1.5, 0.5, -0.8), (2.0, 0.0, -0.8)]
     with nav2(detour) as (made, goals):
         context = replace(bench.context(), stack=replace(default_stack(), planner=made()))
-        skill = Navigate(context)
-        skill.begin(NavigateInputs(Pose2D(2.0, 0.0, 0.0)))
+        skill = installed_skills()["navigate"](context)
+        skill.begin(skill.Inputs(Pose2D(2.0, 0.0, 0.0)))
         while isinstance(step := skill.step(), Running) and clock.now() < 60.0:
             seen.append(bench.robot.pose)
             clock.advance(0.05)
@@ -106,5 +107,5 @@ def test_the_robot_drives_along_the_path_of_nav2():
 
 
 def test_no_nav2_is_a_planning_error():
-    with pytest.raises(PlanningError, match="no Nav2 answers on /compute_path_to_pose"):
+    with pytest.raises(PlanningError, match="no Nav2 is active on /compute_path_to_pose"):
         plan(Nav2(network=f"@:{free_port()}", limit_s=0.3))

@@ -13,7 +13,7 @@ from skills.robot import Pose2D
 
 GRID = GridMap(np.zeros((40, 60), bool), 0.1, (-1.0, -2.0))
 """From (-1, -2) to (5, 2)."""
-FRAMES = {"alice/odom": Pose2D(1.0, 0.0, math.pi / 2)}
+FRAMES = {"alice/odom": Pose2D(1.0, 0.0, math.pi / 2).transform()}
 
 
 def stamped(frame, x, y, yaw=0.0):

@@ -13,7 +13,8 @@ from ros_client import free_port
 from errand_ros2 import backend
 from errand_ros2.backend import Ros2
 from errand_ros2.server import RobotServer
-from errand_ros2.wire.node import Place, open_session
+from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 from plant.robots.spot.kind import spot_capabilities
 from skills.inputs.errors import InputError
 from skills.robot import CommandState, RobotStoppedError
@@ -57,7 +58,10 @@ def test_a_connected_robot_drives_and_is_still_at_the_end(place):
             made.make_ready()
             robot, clock = made.robot, made.clock
             lease = robot.acquire_lease("test")
-            assert made.notes[0] == f"Robot of ROS 2 at ros2://alice, by {place.endpoint}."
+            assert (
+                made.notes[0]
+                == f"Robot of ROS 2 at ros2://alice, by domain 0, Zenoh at {place.endpoint} (by its router)."
+            )
             for _ in range(10):
                 drive = robot.drive(0.4, 0.0, 0.0, until_s=clock.now() + 0.4, lease=lease)
                 clock.advance(0.05)

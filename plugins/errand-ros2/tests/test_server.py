@@ -14,15 +14,18 @@ pytest.importorskip("zenoh", reason="not installed: pip install eclipse-zenoh")
 
 from mcap_ros2._dynamic import generate_dynamic
 from ros_client import connected, free_port, soon
+from ros_run import STORED, TOPICS
 from rosbags.typesys import Stores, get_typestore
 from slow_link import SlowLink
 from zenoh import ext
 from zenoh_ros2_sdk import ROS2Subscriber
 
+from errand_ros2 import messages
 from errand_ros2.part_actions import TRAJECTORY
 from errand_ros2.server import RobotServer
 from errand_ros2.wire import actions
-from errand_ros2.wire.node import Node, Place, open_session
+from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import LATCHED, ros_types
 from plant.robots.spot.kind import spot_capabilities
 from skills.grid_map import GridMap
@@ -31,45 +34,14 @@ from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot
 
 TWIST = "geometry_msgs/msg/Twist"
-IMAGE, INFO = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo"
-TOPICS = {
-    "/clock": "rosgraph_msgs/msg/Clock",
-    "/tf": "tf2_msgs/msg/TFMessage",
-    "/alice/odom": "nav_msgs/msg/Odometry",
-    "/alice/joint_states": "sensor_msgs/msg/JointState",
-    "/alice/imu": "sensor_msgs/msg/Imu",
-    "/alice/scan": "sensor_msgs/msg/LaserScan",
-    "/alice/points": "sensor_msgs/msg/PointCloud2",
-    "/alice/battery_state": "sensor_msgs/msg/BatteryState",
-    "/alice/gripper/holding": "std_msgs/msg/Bool",
-    "/alice/gripper/force": "geometry_msgs/msg/WrenchStamped",
-    "/ground_truth/alice/pose": "geometry_msgs/msg/PoseStamped",
-    **{f"/alice/{each.source}/image": IMAGE for each in spot_capabilities().cameras},
-    **{f"/alice/{each.source}/depth": IMAGE for each in spot_capabilities().cameras},
-    **{
-        f"/alice/{each.source}/image/compressed": "sensor_msgs/msg/CompressedImage"
-        for each in spot_capabilities().cameras
-    },
-    **{
-        f"/alice/{each.source}/depth/compressedDepth": "sensor_msgs/msg/CompressedImage"
-        for each in spot_capabilities().cameras
-    },
-    **{f"/alice/{each.source}/camera_info": INFO for each in spot_capabilities().cameras},
-    **{f"/alice/{each.source}/depth/camera_info": INFO for each in spot_capabilities().cameras},
-}
-STORED = {
-    "/map": "nav_msgs/msg/OccupancyGrid",
-    "/tf_static": "tf2_msgs/msg/TFMessage",
-    "/alice/robot_description": "std_msgs/msg/String",
-}
-"""Topics of which a late subscription gets the last message."""
+IMAGE = "sensor_msgs/msg/Image"
 
 
 class Served:
     """A server of the scripted robot, and a node of another session, which steps it."""
 
     def __init__(self, session, other, place):
-        self.clock, self.place, self.node = VirtualClock(), place, Node(other, "other")
+        self.clock, self.place, self.node = VirtualClock(), place, other.node("other")
         self.robot = ScriptedRobot(self.clock, capabilities=spot_capabilities(), blocks=ROOM)
         self.session = session
 
@@ -96,9 +68,9 @@ class Served:
         assert soon(lambda: all(out.is_heard for each in streams for out, _ in each.out))
         self.soon(lambda: heard.keys() == {*topics})
 
-    def driver(self):
+    def driver(self, kind=TWIST):
         """Returns a function that sends a velocity and steps the robot with it."""
-        command = self.node.publisher("/alice/cmd_vel", TWIST)
+        command = self.node.publisher("/alice/cmd_vel", kind)
         assert soon(lambda: command.is_heard)
 
         def drive(message):
@@ -176,6 +148,17 @@ def test_the_robot_drives_as_it_hears_and_stands_when_it_hears_nothing(served):
     assert served.soon(served.still) < 0.6
 
 
+# Seconds by which the stamp is older than the robot's clock, None for no stamp; whether the robot drives.
+@pytest.mark.parametrize(("older_s", "drives"), [(None, True), (0.0, True), (1.0, False)])
+def test_a_velocity_with_a_stamp_drives_unless_it_is_stale(served, older_s, drives):
+    drive, clock = served.driver("geometry_msgs/msg/TwistStamped"), served.clock
+    served.soon(lambda: clock.now() > 2.0)
+    for _ in range(6):
+        stamp_s = 0.0 if older_s is None else clock.now() - older_s
+        drive({"header": messages.header(stamp_s), "twist": twist(0.5)})
+    assert bool(np.any(served.robot.velocity)) == drives
+
+
 @pytest.mark.parametrize("x", [float("nan"), float("inf")])
 def test_a_velocity_that_is_not_finite_moves_nothing(served, x):
     drive = served.driver()
@@ -218,7 +201,7 @@ def remote(unserved):
         closing(SlowLink(unserved.place.port)) as link,
         open_session(Place(port=link.port)) as session,
     ):
-        command = Node(session, "remote").publisher("/alice/cmd_vel", TWIST)
+        command = session.node("remote").publisher("/alice/cmd_vel", TWIST)
         made = SimpleNamespace(link=link, speed=0.5, robot=robot, still=unserved.still)
 
         def send():

@@ -1,12 +1,13 @@
 """A tree as the message that viewers of py_trees_ros show."""
 
+from types import SimpleNamespace
+
 from py_trees.common import Status
 
 from errand_ros2.tree_topic import snapshot
 from errand_ros2.wire.types import ros_types
 from executive.testing.bench import room_knowledge
 from executive.tree.compiler import compile_mission
-from executive.tree.node import NodeState
 from executive.tree.registry import installed_skills
 from executive.words.mission import Mission
 
@@ -20,8 +21,8 @@ def test_a_snapshot_has_the_nodes_of_the_tree_with_their_links_and_states():
     leaf = next(node for node in root.walk() if not node.children)
     on_the_way = {node.path_id for node in root.walk() if leaf.path_id.startswith(node.path_id)}
     states = {
-        node.path_id: NodeState(
-            Status.RUNNING if node.path_id in on_the_way else Status.INVALID, None, "speaking", None
+        node.path_id: SimpleNamespace(
+            status=Status.RUNNING if node.path_id in on_the_way else Status.INVALID, message="speaking"
         )
         for node in root.walk()
     }

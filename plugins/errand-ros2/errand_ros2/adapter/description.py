@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -74,10 +74,11 @@ class ArmFile(Part):
 
 
 class GripperFile(Part):
-    """Gripper: its action; `scale` from the opening to the action's position; topics of what it feels, if any."""
+    """Gripper: its action; `scale` from the opening to the action's position, which is a joint's and may fall as the
+    gripper opens; topics of what it feels, if any."""
 
     action: Topic
-    scale: float = Field(default=1.0, gt=0.0)
+    scale: float = 1.0
     holding: Topic | None = None
     force: Topic | None = None
     carry: Topic | None = None
@@ -118,10 +119,12 @@ def served_file(kind: str) -> RobotFile:
     """Returns the description of a robot that `errand serve-ros2` serves."""
     can, gripper = capabilities_of(kind), {"holding": "gripper/holding", "force": "gripper/force", "carry": CARRY}
     actions = {"arm": ARM_ACTION, "head": HEAD_ACTION, "gripper": GRIPPER_ACTION}
-    parts = {part: {"action": action} for part, action in actions.items() if getattr(can, part)}
+    parts: dict[str, dict[str, Any]] = {
+        part: {"action": action} for part, action in actions.items() if getattr(can, part)
+    }
     if can.gripper:
-        parts["gripper"] |= gripper
-    topics = {"image": "image", "info": "camera_info", "depth": "depth", "depth_info": "depth/camera_info"}
+        parts["gripper"] |= {**gripper, "scale": can.gripper.finger_joints[0][1]}
+    topics = {"image": "image", "info": "camera_info", "depth": "depth/image", "depth_info": "depth/camera_info"}
     cameras = {each.source: {key: f"{each.source}/{topic}" for key, topic in topics.items()} for each in can.cameras}
     lidar = {"points": "points"} if kind in _RINGED else {"scan": "scan"}
     sensors = {"lidar": lidar, "imu": "imu", "battery": "battery_state", "cameras": cameras}

@@ -16,16 +16,8 @@ from errand_ros2.part_actions import GRIPPER, INVALID_GOAL, TRAJECTORY
 from errand_ros2.readings import within_limits
 from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError
 from errand_ros2.wire.node import Node
-from skills.command_table import CommandTable, LeaseManager
-from skills.robot import (
-    ArmTrajectory,
-    BaseKind,
-    CommandCause,
-    CommandId,
-    CommandState,
-    CommandStatus,
-    Lease,
-)
+from skills.command_table import CommandTable, LeaseManager, refusal_of
+from skills.robot import ArmTrajectory, BaseKind, CommandCause, CommandId, CommandState, CommandStatus, Lease
 
 GONE_S, _CALL_S = 15.0, 0.5
 _LEAST_POINT_S, _HEAD_RAD_S = 0.2, 1.0
@@ -103,9 +95,8 @@ class Ros2Robot(SensedRobot):
         head = self._description.capabilities.head
         if head is None:
             return self.sit()
-        (left, right), (up, down) = head.pan_range_rad, head.tilt_range_rad
-        if not (left <= pan_rad <= right and up <= tilt_rad <= down):
-            return self._commands.refuse(f"point_head: pan {pan_rad:.2f}, tilt {tilt_rad:.2f} rad is out of range")
+        if (out := head.refusal(pan_rad, tilt_rad)) is not None:
+            return self._commands.refuse(out)
         goal_rad, now = np.array([pan_rad, tilt_rad]), self.joints().position_rad
         far_rad = np.abs(goal_rad - [now.get(name, 0.0) for name in head.joint_names]).max()
         motion = ArmTrajectory(np.array([max(_LEAST_POINT_S, far_rad / _HEAD_RAD_S)]), goal_rad[None, :])
@@ -113,9 +104,11 @@ class Ros2Robot(SensedRobot):
 
     def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
         """Sends an opening and a force to the gripper's controller; done by its result."""
-        file = self._description.file.gripper
-        if file is None or self._description.capabilities.gripper is None:
+        file, gripper = self._description.file.gripper, self._description.capabilities.gripper
+        if file is None or gripper is None:
             return self.sit()
+        if (out := gripper.refusal(opening, force_n)) is not None:
+            return self._commands.refuse(out)
         goal = {"command": {"position": file.scale * opening, "max_effort": force_n}}
         return self._act(GRIP, goal, until_s, lease, (opening, force_n))
 
@@ -261,13 +254,8 @@ class Ros2Robot(SensedRobot):
     def _objection(self, part: str, lease: Lease, until_s: float, values: Iterable[float]) -> CommandId | None:
         """Refuses a forbidden command; returns None for an allowed one."""
         now_s, silent_s = self._clock.now(), self.silent_s()
-        if (gone := self._leases.refusal(lease)) is not None:
-            return self._commands.refuse(f"{part}: {gone}", CommandCause.NO_LEASE)
-        if not np.isfinite([*values, min(until_s, 1e9)]).all():
-            return self._commands.refuse(f"{part}: a value is not finite")
-        if until_s <= now_s:
-            late = f"{part}: expires at {until_s:.2f} s, and it is {now_s:.2f} s already"
-            return self._commands.refuse(late, CommandCause.LATE)
+        if refused := refusal_of(part, self._leases.refusal(lease), values, until_s=until_s, now_s=now_s):
+            return self._commands.refuse(*refused)
         if silent_s > OLD_STATE_S:
             return self._commands.refuse(f"{part}: {_old(silent_s)}", CommandCause.NO_ANSWER)
         return None

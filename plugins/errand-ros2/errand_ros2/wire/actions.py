@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from errand_ros2.wire.node import Client, Node, Request
+from errand_ros2.wire.node import Node, Request
 from errand_ros2.wire.types import LATCHED, ActionType, older_services, ros_types
 
 MOST_GOALS, _RESULT_S = 64, 3600.0  # goals whose results are kept; time for which a client waits for a result
@@ -154,7 +154,7 @@ class NoAnswerError(RuntimeError):
 
 @dataclass
 class SentGoal:
-    """Goal that a server accepted; status and result are set when it ends, by a thread of Zenoh."""
+    """Goal that a server accepted; status and result are set when it ends, by a thread of the wire."""
 
     identity: Any
     status: GoalStatus = GoalStatus.EXECUTING
@@ -168,9 +168,9 @@ class ActionClient:
     def __init__(self, node: Node, name: str, type_name: str) -> None:
         kind, base = ActionType(ros_types(), type_name), f"{node.absolute(name)}/_action"
         self.ended = 0  # number of the goals whose result has come
-        self._send = Client(node, f"{base}/send_goal", kind.send_goal)
-        self._cancel = Client(node, f"{base}/cancel_goal", kind.cancel_goal)
-        self._result = Client(node, f"{base}/get_result", kind.get_result)
+        self._send = node.client(f"{base}/send_goal", kind.send_goal)
+        self._cancel = node.client(f"{base}/cancel_goal", kind.cancel_goal)
+        self._result = node.client(f"{base}/get_result", kind.get_result)
 
     def send(self, goal: Any, *, limit_s: float) -> SentGoal | None:
         """Sends a goal or its fields; returns None when the server rejects it. Raises NoAnswerError."""

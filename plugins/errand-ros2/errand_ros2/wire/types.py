@@ -104,6 +104,11 @@ def dds_name(ros_name: str) -> str:
     return f"{package}::{kind}::dds_::{name}_"
 
 
+def ros_name(type_key: str) -> str:
+    """Returns the name of the type that a key begins with: `dds_name` reversed."""
+    return type_key.partition("/")[0].replace("::dds_", "").replace("::", "/").rstrip("_")
+
+
 def topic_name(name: str) -> str:
     """Returns a topic's absolute name. Raises InputError when ROS 2 does not allow it."""
     if _NAME.fullmatch(name) is None:

@@ -15,8 +15,9 @@ from ros_lock_step import LockStep, scripted
 
 from errand_ros2.readings import LIFE_S, stamp_of
 from errand_ros2.server import PERIOD_S
-from errand_ros2.wire.node import Node, Place
+from errand_ros2.wire.node import Place
 from errand_ros2.wire.types import USUAL
+from errand_ros2.wire.zenoh_node import ZenohNode
 from skills.robot import ArmTrajectory, CommandState
 
 LOST, TWICE, LATEST_S = 0.2, 0.1, 0.15
@@ -100,9 +101,9 @@ class LossyStep(LockStep):
 
 @pytest.fixture(scope="module", params=[1, 2, 3])
 def step_of_seed(request):
-    link = LossyLink(request.param, Node.subscribe)
+    link = LossyLink(request.param, ZenohNode.subscribe)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Node, "subscribe", lambda node, *given, **more: link.subscribe(node, *given, **more))
+        patch.setattr(ZenohNode, "subscribe", lambda node, *given, **more: link.subscribe(node, *given, **more))
         step = LossyStep(link)
     with closing(step):
         yield step

@@ -10,7 +10,6 @@ from errand_ros2.adapter.description import served_file
 from errand_ros2.adapter.sensors import SILENT_S
 from errand_ros2.part_actions import GRIPPER, TRAJECTORY
 from errand_ros2.wire.actions import GoalStatus
-from errand_ros2.wire.node import Client
 from errand_ros2.wire.types import ActionType, Attachment, ros_types
 from skills.robot import ArmTrajectory, CommandCause, CommandState, LeaseError
 
@@ -225,7 +224,7 @@ def test_random_bytes_on_every_topic_and_service_move_nothing(step, capfd):
             for _ in range(20):
                 payload = b"\0\1\0\0" + chance.bytes(length // 20)
                 session.get(key, timeout=0.2, payload=payload, attachment=attachment)
-    answer = Client(step.node, f"{space}/{name}/_action/get_result", action.get_result).call({}, limit_s=20.0)
+    answer = step.node.client(f"{space}/{name}/_action/get_result", action.get_result).call({}, limit_s=20.0)
     assert answer.status == GoalStatus.UNKNOWN  # all else has come
     soon(lambda: taken() >= before + sent, 2.0)  # a message may be lost
     step.server.work.submit(step.server.step).result()

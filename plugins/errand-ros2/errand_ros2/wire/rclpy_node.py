@@ -1,0 +1,302 @@
+"""Nodes of an installed ROS 2, by rclpy with whatever middleware it has. One thread calls all handlers of a session."""
+
+from __future__ import annotations
+
+import array
+import logging
+import math
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, contextmanager, suppress
+from importlib import import_module
+from typing import Any, Final
+
+import numpy as np
+import rclpy
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+from rclpy.utilities import get_rmw_implementation_identifier
+
+from errand_ros2.packages import PACKAGES
+from errand_ros2.wire.node import Client, Delays, Node, Place, Publisher, Request, Session, taken_by_others
+from errand_ros2.wire.types import USUAL, Qos, ServiceType
+from skills.inputs.errors import InputError
+
+_LOG: Final = logging.getLogger(__name__)
+_DISCOVERY_S, _COMPARE_S = 1.0, 2.0  # after which publishers of other nodes are known; period of looking at them
+
+
+class NotInstalledError(Exception):
+    """Error of an interface that this ROS 2 does not have, or of no middleware."""
+
+
+def interface(name: str) -> Any:
+    """Returns the class of a message, service or part of an action by its name. Raises NotInstalledError."""
+    package, kind, base = name.split("/")
+    base, _, part = base.partition("_")
+    try:
+        found = getattr(import_module(f"{package}.{kind}"), base)
+        return getattr(found.Impl, part if part == "FeedbackMessage" else f"{part}Service") if part else found
+    except (ImportError, AttributeError) as error:
+        raise NotInstalledError(package) from error
+
+
+def filled(kind: Any, given: Any) -> Any:
+    """Returns a message of a class of rclpy from another or from fields, without those that only one of the two has."""
+    made = kind()
+    for name, described in kind.get_fields_and_field_types().items():
+        value = given.get(name) if isinstance(given, Mapping) else getattr(given, name, None)
+        if value is not None:
+            setattr(made, name, _filled(getattr(made, name), described, value))
+    return made
+
+
+def _filled(usual: Any, described: str, value: Any) -> Any:
+    """Value of a field, whose usual value and description tell its type."""
+    if hasattr(usual, "get_fields_and_field_types"):
+        return filled(type(usual), value)
+    if isinstance(usual, np.ndarray):
+        return np.asarray(value, usual.dtype)
+    if isinstance(usual, array.array):
+        return array.array(usual.typecode, np.asarray(value, f"{usual.typecode}").tobytes())
+    if isinstance(usual, list):
+        of = described.removeprefix("sequence<").partition("[")[0].partition(",")[0].removesuffix(">")
+        package, slash, base = of.partition("/")
+        return [filled(interface(f"{package}/msg/{base}"), each) for each in value] if slash else list(value)
+    return type(usual)(value)
+
+
+class RclpySession(Session):
+    """Context of rclpy, with the thread that calls its handlers."""
+
+    def __init__(self, place: Place, context: Context) -> None:
+        super().__init__(place, f"domain {place.domain}, rclpy with {get_rmw_implementation_identifier()}")
+        self.context, self.missing = context, set[str]()
+        self.executor = SingleThreadedExecutor(context=context)
+        self.nodes: list[rclpy.node.Node] = []
+        self._beside: RclpySession | None = None
+        self._thread = threading.Thread(target=self._spin, name="errand-rclpy", daemon=True)
+        self._thread.start()
+
+    def node(self, name: str, namespace: str = "/") -> RclpyNode:
+        """Makes a node. Raises InputError for a namespace that ROS 2 does not allow."""
+        node = RclpyNode(self, name, namespace)
+        node.inner.create_timer(_COMPARE_S, node.compare_all)
+        return node
+
+    def beside(self) -> RclpySession:
+        """Returns a second session, since no participant of DDS has two types of one topic."""
+        self._beside = self._beside or RclpySession(self.place, started(self.place))
+        return self._beside
+
+    def interface(self, name: str, what: str) -> Any:
+        """Returns the class of a type; None, said once, where its package is not installed, which `what` needs."""
+        try:
+            return interface(name)
+        except NotInstalledError as error:
+            if (package := str(error)) not in self.missing:
+                how = f"`errand ros2 interfaces DIR --package {package}` writes it for colcon"
+                how = how if package in PACKAGES else "pip install 'errand-ros2[rclpy]' brings it"
+                if (distribution := os.environ.get("ROS_DISTRO")) and package != "errand_msgs":
+                    how = f"apt install ros-{distribution}-{package.replace('_', '-')}"
+                _LOG.warning("errand: %s is not installed; what needs it is left out, as %s: %s", package, what, how)
+            self.missing.add(package)
+            return None
+
+    def close(self) -> None:
+        """Ends the thread and the nodes."""
+        if self._beside is not None:
+            self._beside.close()
+        self.executor.shutdown(timeout_sec=0.0)
+        self.context.try_shutdown()
+        self._thread.join()
+        for node in self.nodes:
+            node.destroy_node()
+
+    def _spin(self) -> None:
+        while self.context.ok():
+            with suppress(ExternalShutdownException):
+                try:
+                    self.executor.spin()
+                except Exception as error:  # of rclpy itself, as for a message that cannot be taken
+                    _LOG.warning("errand: rclpy (%s: %s)", type(error).__name__, error)
+
+
+def started(place: Place) -> Context:
+    """Returns a context of rclpy in a place's domain. Raises InputError when rclpy has no middleware."""
+    context = Context()
+    try:
+        rclpy.init(context=context, domain_id=place.domain, signal_handler_options=SignalHandlerOptions.NO)
+    except Exception as error:  # rclpy raises what its middleware raises
+        what = f"rclpy does not start ({str(error).partition(chr(10))[0][:120]})"
+        raise InputError(what, hint="source ROS 2 in this terminal, or write zenoh:") from error
+    return context
+
+
+@contextmanager
+def open_rclpy(place: Place) -> Iterator[RclpySession]:
+    """Opens a session. Raises InputError."""
+    with closing(RclpySession(place, started(place))) as session:
+        yield session
+
+
+class _Nobody(Publisher, Client):
+    """Publisher and client of what needs an interface that is not installed."""
+
+    is_heard = False
+
+    def put(self, message: Any) -> None: ...
+    def call(self, request: Any, *, limit_s: float) -> Any: ...
+    def ask(self, request: Any, take: Callable[[Any], None], *, limit_s: float) -> None: ...
+
+
+class RclpyPublisher(Publisher):
+    """Publisher of one topic."""
+
+    def __init__(self, node: RclpyNode, topic: str, kind: Any, qos: Qos) -> None:
+        self._node, self._kind, self._keeps = node, kind, qos.transient_local
+        self._publisher = node.inner.create_publisher(kind, topic, _profile(qos))
+
+    @property
+    def is_heard(self) -> bool:
+        """Returns whether a subscription exists now, or one may come for the messages that are kept."""
+        return self._keeps or self._publisher.get_subscription_count() > 0
+
+    def put(self, message: Any) -> None:
+        """Publishes a message, or a mapping of its fields."""
+        self._node.sent += 1
+        self._publisher.publish(filled(self._kind, message))
+
+
+class RclpyClient(Client):
+    """Client of a service."""
+
+    def __init__(self, node: RclpyNode, name: str, service: Any) -> None:
+        self._request = service.Request
+        self._client = node.inner.create_client(service, name, callback_group=node.group)
+
+    def call(self, request: Any, *, limit_s: float) -> Any:
+        """Returns the service's response; None when no service answers within the limit (s)."""
+        come, answers, until_s = threading.Event(), list[Any](), time.monotonic() + limit_s
+        if not self._client.wait_for_service(limit_s):
+            return None
+
+        def take(response: Any) -> None:
+            answers.append(response)
+            come.set()
+
+        self._ask(request, take)
+        come.wait(until_s - time.monotonic())
+        return answers[0] if answers else None
+
+    def ask(self, request: Any, take: Callable[[Any], None], *, limit_s: float) -> None:
+        """Calls `take` with the service's response when it comes; waits until the service is there."""
+        if self._client.wait_for_service(min(limit_s, _DISCOVERY_S)):
+            self._ask(request, take)
+
+    def _ask(self, request: Any, take: Callable[[Any], Any]) -> None:
+        def taken(future: Future[Any]) -> None:
+            if (response := future.result()) is not None:
+                take(response)
+
+        self._client.call_async(filled(self._request, request)).add_done_callback(taken)
+
+
+class RclpyNode(Node):
+    """Node of rclpy."""
+
+    def __init__(self, session: RclpySession, name: str, namespace: str) -> None:
+        super().__init__(namespace)
+        self.session, self._name, self._served = session, name, set[str]()
+        self.inner = rclpy.create_node(name, namespace=self.namespace, context=session.context, enable_rosout=False)
+        self.group = ReentrantCallbackGroup()  # else a request that is answered later would hold up all others
+        session.nodes.append(self.inner)
+        session.executor.add_node(self.inner)
+
+    def claim(self, *topics: str) -> None:
+        """Raises InputError when another node publishes one of the topics, which only one may publish."""
+        threading.Event().wait(_DISCOVERY_S)
+        for name in map(self.absolute, topics):
+            if self.inner.get_publishers_info_by_topic(name):
+                raise taken_by_others(name, self.session.place.domain)
+
+    def compare_all(self) -> None:
+        """Compares the types in which the topics are published that are subscribed to."""
+        for name in list(self.types):
+            for info in self.inner.get_publishers_info_by_topic(name):
+                self.compare(name, info.topic_type)
+
+    def publisher(self, topic: str, type_name: str, qos: Qos = USUAL) -> Publisher:
+        """Returns a publisher of a topic."""
+        name = self.absolute(topic)
+        kind = self.session.interface(type_name, name)
+        return _Nobody() if kind is None else RclpyPublisher(self, name, kind, qos)
+
+    def subscribe(
+        self, topic: str, type_name: str, handle: Callable[[Any], Any], qos: Qos = USUAL, late_s: float = math.inf
+    ) -> Callable[[], None]:
+        """Calls `handle` with each message that is not `late_s` late; returns a function that ends the subscription."""
+        name, delays = self.absolute(topic), Delays()
+        self.types[name].append(type_name)
+        if self.types[name][0] != type_name:
+            other = RclpyNode(self.session.beside(), self._name, self.namespace)
+            return other.subscribe(name, type_name, handle, qos, late_s)
+        if (kind := self.session.interface(type_name, name)) is None:
+            return lambda: None
+
+        def received(data: bytes, info: Mapping[str, int]) -> None:
+            took_s = 1e-9 * (time.time_ns() - info["source_timestamp"])
+            if late_s < math.inf and delays.of(b"", took_s) > late_s:
+                return
+            try:
+                message = deserialize_message(data, kind)
+            except Exception:  # the middleware's own errors
+                self.dropped += 1
+                return
+            self.guarded(lambda: handle(message), name)
+            self.handled += 1
+
+        subscription = self.inner.create_subscription(
+            kind, name, received, _profile(qos), callback_group=self.group, raw=True
+        )
+        return lambda: self.inner.destroy_subscription(subscription) and None
+
+    def serve(self, name: str, kind: ServiceType, handle: Callable[[Request], None]) -> None:
+        """Calls `handle` with each request for a service; it may answer later."""
+        name, executor = self.absolute(name), self.session.executor
+        if name in self._served or (service := self.session.interface(kind.name, name)) is None:
+            return  # an installed ROS 2 has one form of each type
+        self._served.add(name)
+
+        async def asked(request: Any, _: Any) -> Any:
+            answered = Future[Any](executor=executor)
+
+            def reply(response: Any) -> None:
+                answered.set_result(filled(service.Response, response))
+                executor.wake()
+
+            self.guarded(lambda: handle(Request(request, reply)), name)
+            return await answered
+
+        self.inner.create_service(service, name, asked, callback_group=self.group)
+
+    def client(self, name: str, kind: ServiceType) -> Client:
+        """Returns a client of a service."""
+        name = self.absolute(name)
+        service = self.session.interface(kind.name, name)
+        return _Nobody() if service is None else RclpyClient(self, name, service)
+
+
+def _profile(qos: Qos) -> QoSProfile:
+    return QoSProfile(
+        depth=qos.depth,
+        reliability=ReliabilityPolicy.RELIABLE if qos.reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if qos.transient_local else DurabilityPolicy.VOLATILE,
+    )

@@ -1,1 +1,1 @@
-"""Skills that find, meet, follow and guide people."""
+"""Skills that find people."""

@@ -20,9 +20,15 @@ from skills.manipulation.approach.base_placement import go_to_one
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import MovingSkill
 from skills.navigate.surroundings import NavigateInputs
-from skills.people.meet_person import person_observation
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark, turn_upright
-from skills.perception.people import SeenPerson, located_people, people_detections, people_in_scan, pictures_with_depth
+from skills.perception.people import (
+    SeenPerson,
+    located_people,
+    people_detections,
+    people_in_scan,
+    person_observation,
+    pictures_with_depth,
+)
 from skills.perception.people_tracking import SCAN_APART_M, PeopleTracker
 from skills.perception.point_cloud import camera_pose_W, project
 from skills.quantities import Coordinate, Count, Delay, Length, Share, Tries, Turn, TurnRate

@@ -50,7 +50,7 @@ def carry_plan(builder: PlanBuilder, meet: NodeSpec | None = None) -> NodeSpec:
         return _hand_over_plan(builder, item, pose, person, meet)
     place = builder.place(goal)
     put, guards = put_down_plan(builder, item, place)
-    skills = tuple(guard.children[0] for guard in guards if guard.children[0].kind == "skill")
+    skills = tuple(guard.children[0] for guard in guards if guard.children[0].skill is not None)
     return recover_fallen_plan(builder.at("carry-on"), item, f"to the {place}", put, guards, skills)
 
 
@@ -59,7 +59,9 @@ def _hand_over_plan(
 ) -> NodeSpec:
     """Carries the item to a person and holds it out; the gripper opens when the person takes it."""
     to = "the start" if builder.command.goal == START else person
-    ports = {"person": person, **builder.optional_ports("hand_over", {"thing": str(item)})}
+    met = meet is not None or (person in builder.met and builder.command.goal_at is None)
+    own = {"thing": str(item), **({"met": True} if met else {})}
+    ports = {"person": person, **builder.optional_ports("hand_over", own)}
     way = _holding(builder, item, f"to {to}", meet or go_near_plan(builder, pose, to))
     hand_over = builder.skill("hand_over", ports, _released(builder, "hand_over"))
     give = _holding(builder.at("give"), item, f"to {to}", hand_over, until_put_down=True)

@@ -17,7 +17,7 @@ from executive.tree.nodes.pick_up import pick_up_plan
 from executive.tree.nodes.policies import FINAL_CAUSES
 from executive.tree.nodes.search import detect_plan, look_plans, place_phrase, required_surfaces
 from executive.tree.plan import PlanBuilder
-from executive.words.command import START, Command, Task
+from executive.words.command import START, Command
 from executive.words.knowledge import EVERYTHING
 from skills.api import Cause, ObjectKind, ObjectObservation
 from skills.class_forms import ANY_OBJECT
@@ -150,9 +150,9 @@ class ForEachFound(MemoryComposite):
 
 def is_clearing(get: Command, bring: Command | None) -> bool:
     """Returns whether two adjacent commands get everything from a place and bring everything somewhere."""
-    if bring is None or get.task is not Task.GRASP or get.object is None or get.object.name != EVERYTHING:
+    if bring is None or not get.takes or get.object is None or get.object.name != EVERYTHING:
         return False
-    return bring.task in (None, Task.PLACE) and get.object == (bring.item if bring.task is None else bring.object)
+    return (bring.task is None or bring.puts) and get.object == (bring.item if bring.task is None else bring.object)
 
 
 def clear_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:

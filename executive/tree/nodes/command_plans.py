@@ -1,21 +1,19 @@
 """Plans of commands: grasp, find, carry, go, wait, charge, people; and of pairs of commands with trips or rounds."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Final
 
 from executive.mission.gripper import held_after, is_same
 from executive.tree.assembly import Assembler, StepPlans
+from executive.tree.board import FromBoard
 from executive.tree.goals import clearing_goals, command_goal, surfaces_to_search
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.carry import carried_along_plan, carry_plan, goal_in_words
+from executive.tree.nodes.carry import carried_along_plan, carry_plan, goal_in_words, goal_pose
 from executive.tree.nodes.clearing import clear_plan, is_clearing, refuse_everything
-from executive.tree.nodes.dock import charge_plan
 from executive.tree.nodes.guard import HoldsNothingElse
-from executive.tree.nodes.people import follow_plan, go_to_goal_plan, greet_plan, guide_plan, meet_plan
-from executive.tree.nodes.pick_up import held_plan, known_held_plan, pick_up_plan
+from executive.tree.nodes.pick_up import go_into_plan, go_near_plan, held_plan, known_held_plan, pick_up_plan
 from executive.tree.nodes.search import (
-    find_plan,
     last_known_floor,
     place_phrase,
     refuse_several,
@@ -25,16 +23,18 @@ from executive.tree.nodes.search import (
     surfaces_first_known,
 )
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
-from executive.words.command import START, TIME_UNITS_S, Command, Task
+from executive.tree.task_page import from_page
+from executive.words.command import START, Command
 from executive.words.goal import GoalCondition, When
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Do, Say
+from executive.words.task import Part, Task, installed_tasks
+from skills.api import ObjectKind
 from skills.descriptions import count_of
 from skills.inputs.errors import InputError, listing
 from skills.quantities import Quantity
 
 MAX_TRIPS: Final = 20
-LONGEST_WAIT_S: Final = 86400.0
 
 
 COUNTED: Final = Annotated[float, Quantity(ge=0.0, le=1_000.0)]
@@ -67,10 +67,11 @@ def _plan(assembler: Assembler, step: Do | Say, builder: PlanBuilder) -> Assembl
     )
     refuse_several(builder)
     refuse_everything(builder)
-    node = _giving(assembler, step, _BY_TASK[command.task](builder), builder)
+    planned = go_plan(builder) if command.task is None else task_plan(command.task, builder)
+    node = _giving(assembler, step, planned, builder)
     flow.held, flow.met = held_after(command, held, knowledge), _met_after(command, flow.met, knowledge)
-    lets_go = command.item is not None or command.task is Task.PLACE
-    flow.opening = opening and command.task is not Task.GRASP and flow.held == held and not lets_go
+    lets_go = command.item is not None or command.puts
+    flow.opening = opening and not command.takes and flow.held == held and not lets_go
     goal = command_goal(command, knowledge, _elsewhere(builder))
     part = StepPart(builder.path_id, command, goal=goal, held=held, opening=opening, node=node.path_id)
     return Assembled((node,), (part,))
@@ -99,8 +100,8 @@ def _giving(assembler: Assembler, step: Do | Say, node: NodeSpec, builder: PlanB
     command, keys = builder.command, dict[str, str]()
     for port, name in (step.gives or {}).items():
         known = ("answer", "count") if command.object_count != 1 else ("answer",)
-        if command.task is not Task.FIND or port not in known:
-            said = listing(known) if command.task is Task.FIND else "no answer"
+        if not command.looks or port not in known:
+            said = listing(known) if command.looks else "no answer"
             hint = "write {answer: NAME} beside a question, or {count: NAME} beside one that counts"
             raise InputError.at(step.source, f"this step gives {said}, not '{port}'", hint=hint)
         option, kind = _ANSWERS[port]
@@ -119,7 +120,7 @@ def _in_usual_place(builder: PlanBuilder) -> bool:
 def _elsewhere(builder: PlanBuilder) -> tuple[str, ...]:
     """Returns the surfaces outside the named place on which a command may find its object."""
     command, knowledge = builder.command, builder.knowledge
-    if command.task is not Task.GRASP or command.object is None or command.goal is None or not builder.anywhere:
+    if not command.takes or command.object is None or command.goal is None or not builder.anywhere:
         return ()
     return surfaces_elsewhere(knowledge, command.object, builder.place(command.goal), builder.avoided)
 
@@ -154,45 +155,89 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     return builder.first_of(f"have the {item}", held_plan(builder, item), get)
 
 
+def meet_plan(builder: PlanBuilder, person: str, place: str | None = None) -> NodeSpec:
+    """Finds a person and goes to them, by the task that meets people. Raises InputError where none is installed."""
+    meets = next((task for task in installed_tasks().values() if task.meets), None)
+    if meets is None:
+        raise builder.error(f"no installed task goes to {person}", "install a plug-in that meets people")
+    return task_plan(meets, replace(builder, command=Command(goal=place, task=meets, object=ObjectKind(person))))
+
+
+def task_plan(task: Task, builder: PlanBuilder) -> NodeSpec:
+    """Plans a command by the page of its task. Raises InputError for a part that the task does not have."""
+    command = builder.command
+    given = ((command.goal, task.goal_is, "place"), (command.object, task.object_is, "object"))
+    for value, part, name in given:
+        if value is not None and part is Part.NOTHING:
+            raise builder.error(f"'{task.word}' takes no {name}, as in '{value}'", "leave it out")
+    return from_page(task, "plan", lambda page: page.plan(builder), NodeSpec)
+
+
+def go_to_goal(builder: PlanBuilder) -> NodeSpec:
+    """Drives near the goal of a command, into a room, or exactly to a named pose; or finds the person who is the goal.
+
+    Raises InputError when the command names no goal.
+    """
+    goal, at, knowledge = builder.command.goal, builder.command.goal_at, builder.knowledge
+    if goal is None:
+        raise builder.error("the command names no place", "name one")
+    to, person = goal_in_words(builder, goal), knowledge.person(goal)
+    if person is not None:
+        drive = meet_plan(builder.at("meet"), person, None if at is None else builder.place(at))
+    elif knowledge.place(goal) in knowledge.poses:
+        drive = builder.navigate(goal_pose(builder, goal), to, exactly=True)
+    elif (room := knowledge.place(goal)) in knowledge.rooms and goal != START:
+        drive = go_into_plan(builder, str(room))
+    else:
+        drive = go_near_plan(builder, goal_pose(builder, goal), to)
+    return carried_along_plan(builder, drive, f"to {to}")
+
+
+def go_to_object(builder: PlanBuilder, key: str) -> NodeSpec:
+    """Plans finding the object of a command, and approaching it; the observation is under a blackboard key then.
+
+    Raises InputError when the command names no object.
+    """
+    item = builder.required_object(builder.command.object)
+    place = None if builder.command.goal is None else builder.place(builder.command.goal)
+    below = builder.at("go")
+    around = tuple(builder.surface(name) for name in surfaces_to_search(builder.knowledge, item, place))
+    approach = below.skill("approach", {"observation": FromBoard(key), "surfaces": around})
+    search = search_plan(below.at("find"), item, place, key)
+    return below.sequence(f"go to the {item}", search, approach)
+
+
 def go_plan(builder: PlanBuilder) -> NodeSpec:
     """Drives to a place, a person or the start; carries the item if the command has one."""
     command = builder.command
     if command.item is not None:
         person, meet = builder.knowledge.person(command.goal or ""), None
-        if person is not None and command.goal_at is not None and builder.has_ports("find_people", ()):
-            meet = meet_plan(builder.at("meet"), person, builder.place(command.goal_at))
+        if person is not None and _is_to_be_found(builder, person):
+            at = command.goal_at or builder.knowledge.people[person].at
+            meet = meet_plan(builder.at("meet"), person, builder.place(at))
         return carry_plan(builder, meet)
     if command.goal is None:
         raise builder.error("the command asks for nothing", "name a place to go to, or an object")
     to = goal_in_words(builder, command.goal)
-    drive = carried_along_plan(builder, go_to_goal_plan(builder, command.goal), f"to {to}")
-    return builder.sequence(f"go to {to}", drive)
+    return builder.sequence(f"go to {to}", go_to_goal(builder))
 
 
-def wait_plan(builder: PlanBuilder) -> NodeSpec:
-    """Goes to the named place, if any, and waits. Raises InputError when the time is missing or too long."""
-    command = builder.command
-    if command.item is not None:
-        raise builder.error(f"the {command.item} cannot be carried by waiting", "take it there in a step of its own")
-    unit = TIME_UNITS_S.get("" if command.object is None else command.object.name)
-    duration_s = 0.0 if unit is None else unit * command.object_count
-    if not 0.0 < duration_s <= LONGEST_WAIT_S:
-        raise builder.error("it is not said for how long to wait", 'name a time up to a day, such as "10 seconds"')
-    pause = builder.pause("wait", f"wait {duration_s:g} s", duration_s)
-    if command.goal is None:
-        return builder.sequence("wait here", pause)
-    to = goal_in_words(builder, command.goal)
-    drive = carried_along_plan(builder, go_to_goal_plan(builder, command.goal), f"to {to}")
-    return builder.sequence(f"wait at {to}", drive, pause)
+def _is_to_be_found(builder: PlanBuilder, person: str) -> bool:
+    """Returns whether a hand-over begins with a search: at a place that is said, or where others usually are, too."""
+    said = builder.command.goal_at is not None
+    rooms = {name: builder.knowledge.room(builder.place(each.at)) for name, each in builder.knowledge.people.items()}
+    several = person not in builder.met and list(rooms.values()).count(rooms[person]) > 1
+    asks = several and any(task.meets for task in installed_tasks().values())
+    return (said or asks) and builder.has_ports("find_people", ())
 
 
 def are_trips(get: Command, bring: Command | None) -> bool:
     """Returns whether two adjacent commands get several objects and bring the same number of them somewhere."""
-    if bring is None or get.task is not Task.GRASP or get.object is None or get.object_count < 2:
+    if bring is None or not get.takes or get.object is None or get.object_count < 2:
         return False
     carried, count = (bring.item, bring.item_count) if bring.task is None else (bring.object, bring.object_count)
     same = carried is not None and carried.plain == get.object.plain and count == get.object_count
-    return bring.task in (None, Task.PLACE) and same
+    return (bring.task is None or bring.puts) and same
 
 
 def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
@@ -226,23 +271,12 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     return builder.sequence(f"bring {count_of(count, str(item and item.plain))} to the {goal}, one at a time", *trips)
 
 
-_BY_TASK: Final[Mapping[Task | None, Callable[[PlanBuilder], NodeSpec]]] = {
-    Task.GRASP: grasp_plan,
-    Task.FIND: find_plan,
-    Task.PLACE: carry_plan,
-    Task.WAIT: wait_plan,
-    Task.CHARGE: charge_plan,
-    Task.FOLLOW: follow_plan,
-    Task.GUIDE: guide_plan,
-    Task.GREET: greet_plan,
-    None: go_plan,
-}
 PLANS: Final[StepPlans] = {Do: _plan, Say: _plan}
 
 
 def _met_after(command: Command, met: frozenset[str], knowledge: Knowledge) -> frozenset[str]:
     """Returns the people whom the robot has met at their places, after a successful command."""
-    if command.task in (Task.FOLLOW, Task.GUIDE) and command.object is not None:
+    if command.task is not None and command.task.moves and command.object is not None:
         return met - {knowledge.person(command.object.name) or ""}
     goes = command.task is None and command.item is None and command.goal is not None
     return met | set(filter(None, (knowledge.person(command.goal or ""),))) if goes else met

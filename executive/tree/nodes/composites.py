@@ -313,7 +313,7 @@ def _refuse_collisions(branches: Sequence[NodeSpec], builder: PlanBuilder) -> No
     """Raises InputError for branches that need the same body part of the robot."""
     users: dict[Part, int] = {}
     for number, branch in enumerate(branches, start=1):
-        skills = (node.options["skill"] for node in branch.walk() if node.kind == "skill")
+        skills = (node.skill for node in branch.walk() if node.skill is not None)
         for part in sorted({part for skill in skills for part in skill.uses}, key=lambda each: each.value):
             if users.setdefault(part, number) != number:
                 what = f"steps {users[part]} and {number} both use the {part.value}"

@@ -294,7 +294,7 @@ def look_plan(builder: PlanBuilder, number: int, look: Look | DoorOpen, key: str
     below = builder.at(f"look-{number}")
     if isinstance(look, DoorOpen):
         plan = door_plan(below, look.between, key, look.max_age_s)
-        check = next(node for node in plan.walk() if node.kind == Check.kind)
+        check = next(node for node in plan.walk() if node.behaviour.answers)
         return plan, StepPart(check.path_id, goal=door_goal(builder.knowledge, look.between))
     below = replace(below, command=look.command)
     refuse_several(below)
@@ -335,6 +335,7 @@ class Check(ExplainedDecorator):
     """
 
     kind = "check"
+    answers = True
     question: str
     key: str
     context: RunContext

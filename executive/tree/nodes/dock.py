@@ -11,8 +11,9 @@ from executive.tree.node import NodeSpec
 from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words import leaf_steps as model
-from executive.words.command import Command, Task
+from executive.words.command import Command
 from executive.words.knowledge import DOCK
+from executive.words.task import basic
 from skills.api import Cause
 from skills.inputs.errors import InputError
 from skills.robot import Pose2D
@@ -43,9 +44,9 @@ def _onto_dock(builder: PlanBuilder, dock: Pose2D) -> tuple[NodeSpec, ...]:
 
 
 def charge_plan(builder: PlanBuilder) -> NodeSpec:
-    """Plans charging at the dock. Raises InputError when the command names anything else."""
-    command, facts = builder.command, builder.knowledge
-    if any(part is not None for part in (command.item, command.goal, command.object)):
+    """Plans charging at the dock. Raises InputError when the command carries an object there."""
+    facts = builder.knowledge
+    if builder.command.item is not None:
         raise builder.error("the robot charges itself, at its dock", "say 'do: charge' alone")
     if facts.dock is None:
         raise builder.error("this world has no dock to charge at", "add 'dock' to its knowledge")
@@ -59,7 +60,7 @@ def _plan(assembler: Assembler, block: model.Dock, builder: PlanBuilder) -> Asse
         raise InputError.at(builder.source, "this world has no dock to charge at", hint=hint)
     level = facts.battery.charged if block.level is None else block.level
     node = dock_plan(builder, facts.dock.pose_2d(), level)
-    command = Command(task=Task.CHARGE)
+    command = Command(task=basic().charge)
     return Assembled((node,), (StepPart(node.path_id, command, goal=command_goal(command, facts)),))
 
 

@@ -122,7 +122,7 @@ class Holds(Condition):
     |---|---|---|
     | at the start: holds an object recognised as another | PRECONDITION | PRECONDITION |
     | at the start: empty | PRECONDITION | holds |
-    | the object is lost, within 0.3 s | EXECUTION | EXECUTION, but holds while the object is offered |
+    | the object is lost, within 0.5 s | EXECUTION | EXECUTION, but holds while the object is offered |
     | the object begins to slip | holds; it is gripped once more firmly | the same, but not while it is offered |
     | the object slips once more | EXECUTION | holds |
     | the gripper has opened | EXECUTION | holds |

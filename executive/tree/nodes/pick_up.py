@@ -5,24 +5,33 @@ Other recoveries are defined beside the work that fails: drives in `executive.tr
 `executive.tree.nodes.dock`.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Final
+from typing import ClassVar, Final
 
+import numpy as np
+from py_trees.common import Status
+
+from executive.tree.behaviour import ExplainedLeaf
 from executive.tree.board import BesideBoard, FromBoard, FromBoardOr
+from executive.tree.context import RunContext
+from executive.tree.estimate import CannotError, Estimate, Walk
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.aside import can_move_aside, move_aside_plan
 from executive.tree.nodes.guard import Holds
 from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.plan import PlanBuilder
-from executive.words.outlines import inside
-from skills.api import Cause, ObjectKind, Surface
-from skills.geometry import compose
+from executive.words.outlines import Point, inside
+from skills.api import Cause, Failed, ObjectKind, Surface
+from skills.geometry import compose, grid_inside
 from skills.robot import Pose2D
 
 ATTEMPTS: Final = 4
 NEARBY_M: Final = ((-0.5, 0.0), (0.0, 0.6), (0.0, -0.6))
 """Alternative poses near a goal, forward and left of it (m)."""
+GRID_M: Final = 0.2
+"""Distance between the places of a room that are tried (m)."""
 _ANY: Final = frozenset(Cause) - {Cause.ERROR}
 _PLANNING: Final = frozenset({Cause.PLANNING})
 _OTHERS: Final = frozenset({Cause.PRECONDITION, Cause.EXECUTION, Cause.POSTCONDITION})
@@ -58,6 +67,55 @@ def go_near_plan(builder: PlanBuilder, pose: Pose2D | FromBoard, to: str) -> Nod
     if not others:
         return direct
     return builder.first_of(f"go to {to}, or near it", direct, *others, part="or-near", one_goal=True)
+
+
+class FreePlace(ExplainedLeaf):
+    """Leaf that writes a pose in a room with space to turn, near the room's own pose and the robot.
+
+    SUCCESS if the costmap has such a pose, else FAILURE with PLANNING.
+    """
+
+    kind = "free place"
+    output_types: ClassVar = {"key": Pose2D}
+    room: str
+    pose: Pose2D
+    area_W: tuple[Point, ...]
+    key: str
+    context: RunContext
+
+    @classmethod
+    def estimate(cls, node: NodeSpec, walk: Walk, first: bool) -> Estimate:
+        """Raises CannotError: a room whose pose no path reaches is out of reach."""
+        raise CannotError(None)
+
+    def update(self) -> Status:
+        """Chooses the pose by the present costmap."""
+        points, here = grid_inside(self.area_W, GRID_M, first_m=GRID_M / 2), self.context.pose()
+        reach_m = max(math.hypot(*corner) for corner in self.context.robot.capabilities().footprint_m)
+        free = points[self.context.free_space().clearance_m(points) > reach_m]
+        if not len(free):
+            return self.fail(Failed(Cause.PLANNING, f"there is no free place in the {self.room}"))
+        # the robot's way counts, too, for a place on its side of what blocks the pose
+        far_m = 2.0 * np.hypot(*(free - [self.pose.x_m, self.pose.y_m]).T) + np.hypot(*(free - [here.x_m, here.y_m]).T)
+        x, y = free[int(np.argmin(far_m))].tolist()
+        self.context.board.put(self.key, Pose2D(x, y, self.pose.yaw_rad))
+        return self.say(f"goes to ({x:.2f}, {y:.2f}) in the {self.room}")
+
+
+def go_into_plan(builder: PlanBuilder, room: str) -> NodeSpec:
+    """Drives to the pose of a room, or, if it is blocked, to a free place in the room.
+
+    selector
+    ├── navigate to the pose
+    └── sequence: choose a free place, navigate there
+    """
+    pose, below = builder.knowledge.place_pose(room).pose_2d(), builder.at("elsewhere")
+    to, key, area_W = f"a free place in the {room}", below.key("pose"), builder.knowledge.rooms[room]
+    choose = below.node("free place", to, part="choose", room=room, pose=pose, area_W=area_W, key=key)
+    drive = below.navigate(FromBoard(key), to)
+    other = below.sequence(f"go into the {room}", choose, drive)
+    direct = builder.navigate(pose, f"the {room}", nearby_m=tuple(_nearby(builder, pose)))
+    return builder.first_of(f"go to the {room}, or into it", direct, other, part="into", one_goal=True)
 
 
 def _nearby(builder: PlanBuilder, pose: Pose2D | FromBoard) -> dict[tuple[float, float], Pose2D | FromBoard]:

@@ -13,11 +13,11 @@ from executive.tree.board import Board, FromBoard, SurfaceOfDetection
 from executive.tree.goals import surfaces_left_out, surfaces_to_search
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.aside import floor_square
-from executive.tree.nodes.pick_up import go_near_plan
+from executive.tree.nodes.pick_up import go_into_plan, go_near_plan
 from executive.tree.plan import PlanBuilder
-from executive.words.command import PEOPLE_TASKS, Task
 from executive.words.knowledge import ANYBODY, ANYTHING, Knowledge
 from executive.words.outlines import inside
+from executive.words.task import Part
 from skills.api import Cause, Failed, ObjectKind, Publish, Surface
 from skills.descriptions import (
     SAME_WITHIN_M,
@@ -71,6 +71,7 @@ class Answer(ExplainedDecorator):
     """
 
     kind = "answer"
+    answers = True
     output_types: ClassVar = {"key": bool, "count_key": float}
     question: str
     denied: str
@@ -214,12 +215,12 @@ def people_looks(
         raise builder.error(f"the robot knows nobody by face, and {person} may be any of several people", hint)
     plans, moves = [], builder.optional_ports("find_people", {"moves": True})
     for room in knowledge.rooms_to_search(person, place):
-        below, pose = builder.at(room), knowledge.place_pose(room)
+        below = builder.at(room)
         area_W, count = knowledge.rooms[room], 0 if tallied else 1
         ports = {"area_W": area_W, "place": room, "person": person, "count": count, **moves}
         tally = {_TALLY: below.key("all")} if tallied else {}
         look = below.skill("find_people", ports, {"observation": key, **tally})
-        plans.append((room, below.look_from(f"look about the {room}", pose.pose_2d(), f"the {room}", look)))
+        plans.append((room, below.sequence(f"look about the {room}", go_into_plan(below, room), look)))
     return tuple(plans)
 
 
@@ -427,15 +428,15 @@ def _asked_for(item: str, count: int) -> str:
 
 def set_answer_options(node: NodeSpec, keys: Mapping[str, str]) -> NodeSpec:
     """Sets options of the node that answers a question, such as the key for the answer."""
-    if node.kind == Answer.kind:
+    if node.behaviour.answers:
         return node.with_options(**keys)
     return replace(node, children=tuple(set_answer_options(child, keys) for child in node.children))
 
 
 def refuse_several(builder: PlanBuilder) -> None:
-    """Raises InputError for a command on several or an open number of objects, unless it asks, waits or greets."""
-    command = builder.command
-    asked = 1 if command.task in (Task.FIND, Task.WAIT, *PEOPLE_TASKS) else command.object_count
+    """Raises InputError for several or an open number of objects, unless the command asks, waits or takes several."""
+    command, task = builder.command, builder.command.task
+    asked = 1 if task is not None and (task.several or task.object_is is Part.TIME) else command.object_count
     for item, count in ((command.item, command.item_count), (command.object, asked)):
         if count != 1:
             said = f"{count} of '{item}'" if count else f"an open number of '{item}'"

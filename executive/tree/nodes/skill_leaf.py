@@ -37,7 +37,6 @@ from skills.robot import Pose2D
 ResultT = TypeVar("ResultT")
 ERROR_TOPIC = "errors"
 _TOLERANCE_S = 1e-6
-_DRIVES: Final = frozenset({"navigate", "guide_person"})
 _SIGNS: Final = {"observation": Sign.SEEN, "released_W": Sign.RELEASED}
 
 
@@ -280,7 +279,8 @@ class SkillLeaf(ExplainedLeaf):
 
 def _drive_goal(node: NodeSpec, walk: Walk) -> Pose2D | None:
     """Goal of a drive, if it is known before the run."""
-    binding = node.options["inputs"].get("goal") if node.name in _DRIVES else None
+    drives = node.skill is not None and Part.BASE in node.skill.uses
+    binding = node.options["inputs"].get("goal") if drives else None
     if isinstance(binding, FromBoard):
         return walk.noted.get(binding.key)
     return binding.value if isinstance(binding, Constant) and isinstance(binding.value, Pose2D) else None

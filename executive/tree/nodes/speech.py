@@ -38,7 +38,7 @@ class AskPeople(ExplainedLeaf):
     | not answered yet | RUNNING |
     | an answer that is not understood | RUNNING; the question is asked again, without more time |
     | an answer that is understood | SUCCESS |
-    | nobody answers within `limit_s` | SUCCESS with `default`; FAILURE with TIMEOUT without one |
+    | no answer that is understood within `limit_s` | SUCCESS with `default`; FAILURE with TIMEOUT without one |
     | the text reads a missing value | FAILURE with PRECONDITION |
     | halted | INVALID with CANCELLED; the question is withdrawn |
 
@@ -70,7 +70,7 @@ class AskPeople(ExplainedLeaf):
 
     def initialise(self) -> None:
         """Asks the question."""
-        self._false_start = None
+        self._false_start, self._heard = None, ""
         self._until_s = self.context.clock.now() + self.limit_s
         try:
             self._text = self.text.fill(Values(self._view, self.keys))
@@ -87,14 +87,16 @@ class AskPeople(ExplainedLeaf):
             return Status.RUNNING
         said, self._asked = self._asked.result(), None
         if not said and self.default is None:
-            return self.fail(Failed(Cause.TIMEOUT, f"nobody answered '{self._text}' within {self.limit_s:g} s"))
+            heard = f"; '{self._heard}' was not understood" if self._heard else ""
+            return self.fail(Failed(Cause.TIMEOUT, f"nobody answered '{self._text}' within {self.limit_s:g} s{heard}"))
         answer = self._meant(said)
         if answer is not None:
             self.context.board.put(self.key, answer)
             self.cause, self.message = None, f"{self._text}{'' if self._text.endswith('?') else ':'} {answer}"
             self.report(answer)
             return Status.SUCCESS
-        self._put(f"I did not understand '{said[:60]}'. {self._text}")
+        self._heard = said[:60]
+        self._put(f"I did not understand '{self._heard}'. {self._text}")
         return Status.RUNNING
 
     def report(self, answer: Value) -> None:

@@ -10,6 +10,7 @@ from executive.tree.assembly import PYTHON_TYPES, Assembler, Flow, StepPlans
 from executive.tree.behaviour import ExplainedLeaf
 from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
+from executive.tree.node_view import plain
 from executive.tree.nodes.decision_nodes import Keys, Values, View
 from executive.tree.plan import Assembled, PlanBuilder
 from executive.words import leaf_steps as model
@@ -49,7 +50,7 @@ class SetValues(ExplainedLeaf):
             except ExpressionError as error:
                 return self.fail(Failed(Cause.PRECONDITION, f"{each.text}: {error.message}"))
             self.context.board.put(key, float(value) if self.kinds[key] is float else value)
-            texts.append(f"{key.rsplit('/', 1)[-1]} = {value}")
+            texts.append(f"{key.rsplit('/', 1)[-1]} = {plain(value)}")
         return self.say(", ".join(texts))
 
 

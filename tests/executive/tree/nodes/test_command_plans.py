@@ -57,7 +57,7 @@ def test_a_named_pose_is_taken_exactly_and_a_room_nearly(knowledge, registry):
     steps = (node for node in tree.root.walk() if node.name == "navigate" and "/watch/" not in node.path_id)
     drives = [node.options["inputs"] for node in steps]
     assert (drives[0]["goal"], drives[0]["position_tolerance_m"]) == (Constant(Pose2D(4.0, 0.5, 1.0)), Constant(0.08))
-    assert len(drives) == 2 and "position_tolerance_m" not in drives[1]
+    assert drives[1:] and not any("position_tolerance_m" in each for each in drives[1:])
     (at_pump, _) = (part.goal.goal[0] for part in tree.parts)
     assert at_pump.contains((4.2, 0.5, 0.5)) and not at_pump.contains((4.4, 0.5, 0.5))
 

@@ -1,8 +1,12 @@
 """Recovery in compiled trees with skills that fail by their scripts: chosen by cause, bounded, without leaks."""
 
+import math
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from py_trees.common import Status
 
 from executive.run.control import Control
 from executive.run.outcome import Outcome
@@ -10,19 +14,23 @@ from executive.run.visitor import RunSettings
 from executive.tree.board import FromBoard
 from executive.tree.compiler import compile_mission
 from executive.tree.goals import surfaces_to_search
+from executive.tree.nodes.pick_up import FreePlace
 from executive.tree.nodes.search import surfaces_elsewhere
-from executive.tree.registry import built_in_skills
 from executive.words.command import parse_command
 from executive.words.knowledge import load_knowledge
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
+from executive.words.outlines import inside
 from skills.api import Cause, Failed, ObjectKind, Succeeded
 from skills.relations import Landmark, Relation, RelationKind
 from skills.robot import Pose2D
 from tests.executive.conftest import COKE
 from tests.executive.tree.scripted import CAUSES, told
+from tests.project import core_skills
 
 GO = "Take [Nothing] to [hall] and do [Nothing] to [Nothing]"
+COUNTER = "Take [Nothing] to [counter] and do [Nothing] to [Nothing]"
+KITCHEN = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"
 GRASP = "Take [Nothing] to [kitchen] and do [grasp] to [coke]"
 FIND = "Take [Nothing] to [kitchen] and do [find] to [coke]"
 PUT = "Take [coke] to [bedroom] and do [Nothing] to [Nothing]"
@@ -86,7 +94,8 @@ def test_a_failure_is_followed_by_its_recoveries_in_order(worst, script, fails, 
 @pytest.mark.parametrize(
     ("text", "skill", "causes", "counts", "last"),
     [
-        (GO, "navigate", "P" * 99, {"navigate": 12, "clear_costmap": 4, "back_off": 4}, "navigate"),
+        (GO, "navigate", "P" * 99, {"navigate": 6, "clear_costmap": 2, "back_off": 2}, "navigate"),
+        (COUNTER, "navigate", "P" * 99, {"navigate": 12, "clear_costmap": 4, "back_off": 4}, "navigate"),
         (GRASP, "grasp", "B" * 99, {"grasp": 3}, "stow"),
         (GRASP, "grasp", "F" * 99, {"grasp": 3}, "stow"),
         (GRASP, "grasp", "O" * 99, {"grasp": 3}, "stow"),
@@ -113,8 +122,42 @@ def test_other_failures_to_go_somewhere_need_no_other_costmap(worst, script, fai
 
 def test_a_pose_nearby_is_tried_when_there_is_no_path_to_the_goal(worst, fails):
     navigate = fails("navigate", "PPP")
-    assert worst(GO).outcome is Outcome.SUCCESS
-    assert [inputs.goal for inputs in navigate[:4]] == [Pose2D(0.0, 0.0, 0.0)] * 3 + [Pose2D(-0.5, 0.0, 0.0)]
+    assert worst(COUNTER).outcome is Outcome.SUCCESS
+    assert [inputs.goal for inputs in navigate[:4]] == [Pose2D(4.5, -1.0, 0.0)] * 3 + [Pose2D(4.0, -1.0, 0.0)]
+
+
+def test_a_free_place_in_the_room_is_taken_when_its_pose_is_blocked(worst, fails, knowledge):
+    navigate = fails("navigate", "PPP")
+    assert worst(KITCHEN).outcome is Outcome.SUCCESS
+    goal, pose = navigate[3].goal, knowledge.place_pose("kitchen").pose_2d()
+    assert inside(knowledge.rooms["kitchen"], (goal.x_m, goal.y_m)) and goal.yaw_rad == pose.yaw_rad
+    assert math.dist((goal.x_m, goal.y_m), (pose.x_m, pose.y_m)) < 0.5
+
+
+class CostmapWithPerson:
+    """A costmap with somebody at (4, 0), or full of obstacles."""
+
+    def __init__(self, full: bool) -> None:
+        self._full = full
+
+    def clearance_m(self, points_W):
+        return np.zeros(len(points_W)) if self._full else np.hypot(*(points_W - [4.0, 0.0]).T) - 0.2
+
+
+# is the whole room blocked? -> the status, and whether a pose is written
+@pytest.mark.parametrize("full", [False, True])
+def test_the_free_place_is_beside_a_person_on_the_rooms_pose_on_the_robots_side(context, full):
+    here = replace(context, costmap=CostmapWithPerson(full))
+    area_W = ((2.0, -2.0), (6.0, -2.0), (6.0, 2.0), (2.0, 2.0))
+    pose = Pose2D(4.0, 0.0, 1.0)
+    leaf = FreePlace(path_id="alice/f", name="f", room="hall", pose=pose, area_W=area_W, key="alice/pose", context=here)
+    leaf.tick_once()
+    if full:
+        assert (leaf.status, leaf.cause) == (Status.FAILURE, Cause.PLANNING)
+        return
+    free = context.board.get("alice/pose")
+    assert leaf.status == Status.SUCCESS and free.yaw_rad == 1.0
+    assert free.x_m < 4.0 and 0.7 < math.dist((free.x_m, free.y_m), (4.0, 0.0)) < 1.2
 
 
 def test_nothing_else_is_tried_when_all_poses_are_out_of_reach(worst, script):
@@ -298,7 +341,7 @@ def test_a_dropped_object_is_picked_up_twice_and_then_given_up(carrying, script)
 
 def test_the_robot_looks_first_at_the_spot_where_the_object_fell(knowledge):
     mission = Mission(name="m", robot="Alice", steps=(Do.from_command(parse_command(PUT)),))
-    tree = compile_mission(mission, knowledge=knowledge, registry=built_in_skills())
+    tree = compile_mission(mission, knowledge=knowledge, registry=core_skills())
     (find,) = [node for node in tree.mission.walk() if node.path_id.endswith("carry-on/again/find")]
     looks = [node.options["inputs"] for node in find.walk() if node.name == "detect"]
     assert [inputs.get("expected_W") for inputs in looks[:2]] == [

@@ -127,6 +127,7 @@ def test_answers_that_mean_nothing_give_no_more_time(ask, control, clock):
         control.answer(ID, "mars")
         assert tick(root, 1, clock, 3.0) == [R]
     assert (tick(root, 1, clock, 1.1), root.cause) == ([F], Cause.TIMEOUT)
+    assert root.message.endswith("within 10 s; 'mars' was not understood")
 
 
 def test_a_text_without_a_value_fails(ask, control):

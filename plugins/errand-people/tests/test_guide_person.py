@@ -8,10 +8,10 @@ import pytest
 from planar_people import person_at
 from planar_robot import Bench, ExactPlace
 
+from errand_people.followed_person import Target, TargetOptions
+from errand_people.guide_person import GuidePerson, GuidePersonInputs, GuidePersonOptions, places_of
 from executive.run.control import Control
 from skills.api import Cause, Failed, Running, Succeeded, nobody_to_ask
-from skills.people.followed_person import Target, TargetOptions
-from skills.people.guide_person import GuidePerson, GuidePersonInputs, GuidePersonOptions, _places_of
 from skills.perception.people import SeenPerson
 from skills.robot import Pose2D
 
@@ -219,7 +219,7 @@ def test_a_person_out_of_sight_is_looked_for_ahead_behind_and_where_they_are_see
     target = Target(seen(1.0, 0.0), Pose2D(0.0, 0.0, 0.0), TargetOptions())
     for n in range(1, 31):
         target.update([seen(1.0 + 0.1 * n, 0.1 * n)], (), 0.1 * n)
-    places = _places_of(target)
+    places = places_of(target)
     assert [next(places)[0] for _ in range(3)] == pytest.approx([4.0, 6.0, 2.0], abs=0.11)
     target.update([seen(4.5, 5.0, 2)], (), 5.0)
     assert next(places) == (4.5, 0.0)

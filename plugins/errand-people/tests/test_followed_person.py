@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from skills.people.followed_person import Target, TargetOptions, is_addressed
+from errand_people.followed_person import Target, TargetOptions, is_addressed
 from skills.perception.people import SeenPerson
 from skills.robot import Pose2D
 

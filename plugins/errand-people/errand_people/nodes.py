@@ -5,7 +5,7 @@ The robot recognises no faces. Among several people, it asks each "Are you Robin
 
 import math
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, ClassVar, Final
 
@@ -13,7 +13,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.tree.behaviour import ExplainedLeaf, cause_of, message_of
-from executive.tree.board import Constant, FromBoard, FromBoardOr, PlaceOf
+from executive.tree.board import Board, Constant, FromBoard, FromBoardOr
 from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.carry import goal_in_words, goal_pose
@@ -40,6 +40,18 @@ ANSWER_WITHIN_S: Final = 12.0
 STILL_NEAR_M: Final = 3.5
 STILL_NEAR_S: Final = 120.0
 """Distance and time within which a person is still the one of an earlier meeting."""
+
+
+@dataclass(frozen=True)
+class PlaceOf(FromBoard):
+    """Binding of a port to the position (x, y) of the person whose observation is under a blackboard key."""
+
+    gives: ClassVar[Any] = tuple[Coordinate, Coordinate]
+
+    def read(self, board: Board) -> tuple[float, float]:
+        """Returns the position. Raises KeyError when no person was observed yet."""
+        seen: ObjectObservation = board.get(self.key)
+        return seen.position_W[0], seen.position_W[1]
 
 
 class OnlyIfNear(OnlyIfKnown):
@@ -370,17 +382,6 @@ def _go_beside(builder: PlanBuilder, person: str, key: str, place: object = "", 
     """Goes beside the person detected under a key, in a room called `place`; updates the person's position."""
     ports = {"person": person, "place_W": PlaceOf(key), "place": place, **options}
     return builder.skill("meet_person", ports, {"person": key})
-
-
-def go_to_goal_plan(builder: PlanBuilder, goal: str) -> NodeSpec:
-    """Drives near a place or the start, or exactly to a named pose; or finds a person and goes to them."""
-    person = builder.knowledge.person(goal)
-    if person is None and builder.knowledge.place(goal) in builder.knowledge.poses:
-        return builder.navigate(goal_pose(builder, goal), goal_in_words(builder, goal), exactly=True)
-    if person is None:
-        return go_near_plan(builder, goal_pose(builder, goal), goal_in_words(builder, goal))
-    at = builder.command.goal_at
-    return meet_plan(builder.at("meet"), person, None if at is None else builder.place(at))
 
 
 def follow_plan(builder: PlanBuilder) -> NodeSpec:

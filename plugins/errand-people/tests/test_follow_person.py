@@ -8,13 +8,12 @@ import pytest
 from planar_people import LateAnswer, PeopleDetector, blind, person_at
 from planar_robot import Bench, Box, ExactPlace
 
-from skills.api import Cause, Failed, Running, Succeeded, nobody_to_ask
+from errand_people.follow_person import FollowPerson, FollowPersonInputs
+from errand_people.followed_person import FollowPersonOptions, Target, TargetOptions, poses_to_search
+from skills.api import Cause, Failed, Running, Succeeded, Zone, ZoneKind, nobody_to_ask
 from skills.doorway import Doorway
-from skills.people.follow_person import FollowPerson, FollowPersonInputs
-from skills.people.followed_person import FollowPersonOptions, Target, TargetOptions, poses_to_search
 from skills.perception.people import SeenPerson
 from skills.robot import Pose2D
-from skills.world_model import Zone, ZoneKind
 
 START, LANE_M = Pose2D(1.5, 5.4, 0.0), 5.4
 END = ((5.0, 4.5), (8.0, 4.5), (8.0, 6.5), (5.0, 6.5))
@@ -173,6 +172,15 @@ def test_somebody_found_after_a_search_is_followed_only_if_they_are_the_person(a
     walk = Walk(to_m=5.5, gone_s=6.0, back_s=9.5, answer=answer, place_W=(3.2, LANE_M), until_W=END)
     assert isinstance(walk.run(), outcome)
     assert walk.questions == ["Are you Robin?"]
+
+
+def test_a_person_who_is_not_told_apart_from_others_nearby_is_a_failure_that_says_so():
+    walk = Started(to_m=5.5, others=[person_at(3.6, LANE_M + 1.0)], place_W=(3.2, LANE_M), until_W=END, seconds=5.0)
+    walk.skill.options = replace(QUICK, doubtful_s=1.0, answer_s=30.0)
+    walk.skill._target.doubt()
+    step = walk.run()
+    assert step.cause is Cause.EXECUTION
+    assert step.message == "Robin could not be told apart from others for 1 s"
 
 
 def test_after_drives_that_failed_the_robot_makes_way_for_the_person_next_to_it(monkeypatch):

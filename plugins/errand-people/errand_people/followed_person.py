@@ -102,10 +102,10 @@ class FollowPersonOptions:
     hidden person is lost after this time, or after `gone_s` once the robot stands at the last known position. `doors`,
     `search_s`, `plans` and `again_s`: it then searches beyond so many doors and in the named place, each for this time
     or number of plans; `asking_s`: then it asks and listens. `hearing_m`, `answer_s` and `silences`: a doubtful person
-    within this distance is asked for the name, has this time, and is rejected after so many silences. `standing_s`: it
-    also asks a person who stands this long outside the named place. `finding_s`: time to find the person at the
-    beginning. `tries` and `longest_loss_s`: it fails after so many failed drives in a row, and at the end when the
-    person was out of sight for longer.
+    within this distance is asked for the name, has this time, and is rejected after so many silences. `doubtful_s`: it
+    fails when others have been near a doubtful person for longer. `standing_s`: it also asks a person who stands this
+    long outside the named place. `finding_s`: time to find the person at the beginning. `tries` and `longest_loss_s`:
+    it fails after so many failed drives in a row, and at the end when the person was out of sight for longer.
     """
 
     behind_m: Length = 1.6
@@ -128,6 +128,7 @@ class FollowPersonOptions:
     answer_s: Delay = 5.0
     standing_s: Delay = 30.0
     silences: Tries = 2
+    doubtful_s: Duration = 20.0
     doors: Tries = 3
     tries: Tries = 60
     longest_loss_s: Delay = 12.0

@@ -8,8 +8,8 @@ import pytest
 from planar_people import PeopleDetector, blind, person_at
 from planar_robot import TWO_ROOMS, Bench, Box
 
+from errand_people.meet_person import MeetPerson, MeetPersonInputs
 from skills.api import Cause, Failed, Running, Succeeded
-from skills.people.meet_person import MeetPerson, MeetPersonInputs
 from skills.robot import Pose2D
 
 START = Pose2D(1.2, 5.4, 0.0)

@@ -4,25 +4,24 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from typing import ClassVar, Final
+from typing import ClassVar
 
 import numpy as np
 
-from skills.api import Cause, ObjectKind, ObjectObservation, Part, Running, Succeeded
+from skills.api import Cause, ObjectObservation, Part, Running, Succeeded
 from skills.footprint import footprint_clear
 from skills.geometry import bearing_rad, facing_poses, line_of_sight
 from skills.manipulation.approach.base_placement import go_to_one
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.surroundings import NavigateInputs
 from skills.navigate.trip_planning import place_text
-from skills.perception.people import SeenPerson
+from skills.perception.people import SeenPerson, person_observation
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.quantities import Coordinate, Delay, Length, Tries, Turn
 from skills.robot import Pose2D
 from skills.routine import Patience, Routine, RoutineSkill, SkillFailure
 from skills.world_model import PERSON
 
-PERSON_SIZE_M: Final = (0.5, 0.5, 1.7)
 _SCAN_AGE_S = 1.0
 _ARM_M = 0.5
 """Distance from a person's axis up to which their own body is in the costmap."""
@@ -35,12 +34,6 @@ _POSES_EACH = 2
 def person_text(name: str) -> str:
     """Name of a person in a sentence."""
     return "the person" if name == PERSON else name
-
-
-def person_observation(seen: SeenPerson, name: str, place: str | None) -> ObjectObservation:
-    """Observation of a person under a name."""
-    middle_W = (*seen.place_W, PERSON_SIZE_M[2] / 2)
-    return ObjectObservation(seen.stamp_s, ObjectKind(name), middle_W, PERSON_SIZE_M, 0.0, seen.score, place)
 
 
 @dataclass(frozen=True)

@@ -7,19 +7,19 @@ from typing import ClassVar, Final
 
 import numpy as np
 
+from errand_people.followed_person import Target, TargetOptions, people_about
+from errand_people.listening import ListeningSkill
+from errand_people.meet_person import MeetPerson, MeetPersonInputs, MeetPersonOptions, person_text
 from skills.api import Cause, Part, Running, Step, Succeeded, say
 from skills.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose_array
 from skills.geometry import grid_inside, inside_polygon, wrap
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.skill import Navigate
 from skills.navigate.surroundings import Company, NavigateInputs
-from skills.people.followed_person import Target, TargetOptions, people_about
-from skills.people.meet_person import MeetPerson, MeetPersonInputs, MeetPersonOptions, person_text
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.quantities import Coordinate, Delay, Length, Speed, Tries, Turn
 from skills.robot import Pose2D
 from skills.routine import ENDED_EARLY, Patience, Routine, SkillFailure
-from skills.small.speak import ListeningSkill
 
 _TRACKING: Final = PeopleOptions(period_s=1.0, track_m=6.0, hidden_s=8.0)
 _NEAR: Final = MeetPersonOptions(apart_m=(1.3, 1.6, 2.2, 2.7))
@@ -236,7 +236,7 @@ class GuidePerson(ListeningSkill[GuidePersonInputs]):
         last = None if self._target is None else self._target.seen
         if last is not None:
             say(self.context, "I come back for you.")
-        for place_W in (self._place_W,) if self._target is None else _places_of(self._target):
+        for place_W in (self._place_W,) if self._target is None else places_of(self._target):
             try:
                 goal = MeetPersonInputs(inputs.person, place_W)
                 met = yield from self.perform(MeetPerson(self.context, _NEAR), goal, self._is_close)
@@ -290,7 +290,7 @@ class GuidePerson(ListeningSkill[GuidePersonInputs]):
         return bool(area) and bool(inside_polygon(np.array([(here.x_m, here.y_m)]), area).all())
 
 
-def _places_of(target: Target) -> Iterator[tuple[float, float]]:
+def places_of(target: Target) -> Iterator[tuple[float, float]]:
     """Yields possible positions of a hidden person: the last one, farther in the same direction, and back on the trail.
 
     When the robot sees the person from one of them, the person's position comes next.

@@ -7,15 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from skills.api import Cause, ClearableCostmap, Failed, Part, Running, SkillContext, Succeeded, say
-from skills.footprint import SAFE_MARGIN_M, NoObstacles, footprint_clearance_m, with_discs
-from skills.geometry import bearing_rad, inside_polygon, wrap
-from skills.navigate.arm_footprint import ArmFootprint
-from skills.navigate.giving_way import GivingWayOptions, pose_aside
-from skills.navigate.skill import Navigate
-from skills.navigate.surroundings import Company, NavigateInputs
-from skills.navigate.trip_planning import place_text
-from skills.people.followed_person import (
+from errand_people.followed_person import (
     FollowPersonOptions,
     Target,
     is_addressed,
@@ -25,12 +17,20 @@ from skills.people.followed_person import (
     poses_behind,
     poses_to_search,
 )
+from errand_people.listening import ListeningSkill
+from skills.api import Cause, ClearableCostmap, Failed, Part, Running, SkillContext, Succeeded, say
+from skills.footprint import SAFE_MARGIN_M, NoObstacles, footprint_clearance_m, with_discs
+from skills.geometry import bearing_rad, inside_polygon, wrap
+from skills.navigate.arm_footprint import ArmFootprint
+from skills.navigate.giving_way import GivingWayOptions, pose_aside
+from skills.navigate.skill import Navigate
+from skills.navigate.surroundings import Company, NavigateInputs
+from skills.navigate.trip_planning import place_text
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleWatch
 from skills.quantities import Coordinate, Duration, Speed
 from skills.robot import FloatArray, Pose2D
 from skills.routine import Routine, SkillFailure
-from skills.small.speak import ListeningSkill
 
 _SURELY_M = 0.1
 """Distance inside the edge of a place beyond which a person is certainly in it."""
@@ -104,8 +104,8 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "nobody is seen, localisation is lost, or the robot refuses to drive",
         Cause.PLANNING: "no path leads to the person",
-        Cause.EXECUTION: "the person is lost, a camera is at fault, or the robot loses localisation or its LiDAR, or "
-        "refuses to drive on",
+        Cause.EXECUTION: "the person is lost, or not told apart from others, a camera is at fault, or the robot loses "
+        "localisation or its LiDAR, or refuses to drive on",
         Cause.TIMEOUT: "the person has not stood still in the place within the time limit",
     }
     default_timeout_s: ClassVar[float] = 1800.0
@@ -126,7 +126,7 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         super().begin(inputs)
         self._inputs, self._limit_s = inputs, self.context.clock.now() + inputs.time_limit_s
         self._outline, self._tries, self._silences = ArmFootprint(self.context).now(), 0, 0
-        self._planned_s = self._aside_until_s = -math.inf
+        self._planned_s = self._aside_until_s = self._told_apart_s = -math.inf
         self._aside, self._made_way = None, False
         self._company.watch = PeopleWatch(self.context, self.options.people)
 
@@ -203,12 +203,14 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
 
     def _keep_behind(self, target: Target) -> Routine[bool]:
         """Follows until the person stands in the place (returns True), or is lost (returns False)."""
-        place = self._inputs.until_W
+        place, self._told_apart_s = self._inputs.until_W, self._now()
         while (hidden_s := target.hidden_s(self._now())) < self.options.lost_s:
             if hidden_s > self.options.gone_s and self._goal is None:
                 return False
             here, seen_W = self.context.pose(), target.seen.place_W
-            if target.doubted is not None and not (yield from self._is_right(target, target.doubted)):
+            if target.doubted is None:
+                self._told_apart_s = self._now()
+            elif not (yield from self._is_right(target, target.doubted)):
                 return False
             near = not hidden_s and math.dist((here.x_m, here.y_m), seen_W) < self.options.near_m + _BETWEEN_M
             rests = near and target.doubted is None and target.stands_still(self._now())
@@ -228,13 +230,19 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
     def _is_right(self, target: Target, before: SeenPerson) -> Routine[bool]:
         """Asks a doubtful person for their name, unless another person might answer.
 
-        A person who says no, or is silent too often, is rejected.
+        A person who says no, or is silent too often, is rejected. Raises SkillFailure with cause EXECUTION when other
+        people have been near a doubtful person for too long.
         """
         here, seen, stands = self.context.pose(), target.seen, target.stands_still(self._now())
         tracks = [one for one in self._company.watch.tracks() if one.stamp_s > self._now() - _IN_VIEW_S]
         near = people_about(tracks, here, None, self.options.hearing_m, math.pi)
         if self._inputs.place_W is None:  # the person before the robot has no name
             target.doubted = None
+        if target.doubted is None or len(near) < 2:
+            self._told_apart_s = self._now()
+        elif (unclear_s := self._now() - self._told_apart_s) > self.options.doubtful_s:
+            why = f"{self._inputs.person} could not be told apart from others for {unclear_s:.0f} s"
+            raise SkillFailure(Cause.EXECUTION, why)
         in_sight = self._is_clear(np.array([(here.x_m, here.y_m), seen.place_W]))
         if target.doubted is None or not is_addressed(seen, near, here, still=stands, in_sight=in_sight):
             return True

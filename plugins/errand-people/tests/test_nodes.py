@@ -1,13 +1,20 @@
 """People: who it is, where they are, greeting each once, and what is said when nobody confirms it."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
+from errand_people.nodes import PlaceOf
 from executive.run.control import Control
 from executive.run.outcome import Outcome
-from executive.tree.board import Constant
+from executive.tree.board import Board, Constant
+from executive.tree.compiler import compile_mission
+from executive.tree.registry import installed_skills
+from executive.words.command import parse_command
 from executive.words.goal import GoalKind
+from executive.words.leaf_steps import Do
+from executive.words.mission import Mission
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Succeeded
 from skills.robot import Pose2D
 from tests.visitors import OnTick
@@ -246,6 +253,12 @@ def test_a_person_who_cannot_be_reached_is_not_claimed_to_be_greeted(result_of, 
     assert script.begun.count("speak") == 1
 
 
+def test_a_port_may_be_the_place_of_a_person(make):
+    board = Board("alice")
+    board.put("alice/person", replace(make.COKE, position_W=(4.0, 5.0, 0.9)))
+    assert PlaceOf("alice/person").read(board) == (4.0, 5.0)
+
+
 def test_the_speaker_is_followed_and_guided_without_a_search(compiled):
     for task in ("follow", "guide"):
         tree = compiled(f"Take [Nothing] to [kitchen] and do [{task}] to [speaker]")
@@ -264,13 +277,38 @@ def test_following_ends_in_the_room_of_the_goal(compiled, knowledge):
     ("text", "kind", "person", "regions"),
     [
         (TO_ROBIN, GoalKind.MET, "Robin", []),
-        ("Take [Nothing] to [kitchen] and do [follow] to [Robin]", GoalKind.FOLLOWED, "Robin", ["kitchen"]),
-        ("Take [Nothing] to [Nothing] and do [follow] to [speaker]", GoalKind.FOLLOWED, None, []),
-        ("Take [Nothing] to [counter] and do [guide] to [Robin]", GoalKind.GUIDED, "Robin", ["kitchen"]),
-        (GREET, GoalKind.GREETED, None, ["hall"]),
+        ("Take [Nothing] to [kitchen] and do [follow] to [Robin]", GoalKind.OWN, "Robin", ["kitchen"]),
+        ("Take [Nothing] to [Nothing] and do [follow] to [speaker]", GoalKind.OWN, None, []),
+        ("Take [Nothing] to [counter] and do [guide] to [Robin]", GoalKind.OWN, "Robin", ["kitchen"]),
+        (GREET, GoalKind.OWN, None, ["hall"]),
     ],
 )
 def test_the_goal_condition_of_a_command_about_people(compiled, text, kind, person, regions):
     (part,) = compiled(text).parts
     assert (part.goal.kind, part.goal.person) == (kind, person)
     assert [region.name for region in part.goal.goal] == regions
+
+
+GIVE = "Take [coke] to [Robin] and do [Nothing] to [Nothing]"
+
+
+# steps before the hand-over -> what the skill is told of having met the person
+@pytest.mark.parametrize(("before", "met"), [((), None), ((TO_ROBIN,), Constant(True))])
+def test_a_hand_over_is_told_that_the_person_was_met_before(knowledge, before, met):
+    steps = tuple(Do.from_command(parse_command(text)) for text in (*before, GIVE))
+    mission = Mission(name="give", robot="Alice", steps=steps)
+    tree = compile_mission(mission, knowledge=knowledge, registry=installed_skills())
+    (give,) = (node for node in tree.root.walk() if node.name == "hand_over")
+    assert give.options["inputs"].get("met") == met
+
+
+# where Sam usually is -> what a hand-over to Robin in the hall is told of having met him
+@pytest.mark.parametrize(("at", "met"), [("bedroom", None), ("hall", Constant(True))])
+def test_a_hand_over_where_several_known_people_are_begins_with_a_question(knowledge, at, met):
+    people = {**knowledge.people, "Sam": knowledge.people["Sam"].model_copy(update={"at": at})}
+    knowledge = knowledge.model_copy(update={"people": people})
+    mission = Mission(name="give", robot="Alice", steps=(Do.from_command(parse_command(GIVE)),))
+    tree = compile_mission(mission, knowledge=knowledge, registry=installed_skills())
+    (give,) = (node for node in tree.root.walk() if node.name == "hand_over")
+    asks = any(node.kind == "who is it" for node in tree.root.walk())
+    assert (give.options["inputs"].get("met"), asks) == (met, met is not None)

@@ -1,0 +1,1 @@
+"""Plug-in of Errand: it follows, guides, meets, greets and asks people."""

@@ -1,5 +1,6 @@
 """AprilTags as files: to print, as plates, and on imported models."""
 
+import math
 import shutil
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -7,18 +8,26 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from errand_make.errors import ObjectImportError
 from errand_make.tags import SIDES, stick_on, tag_picture, tag_svg, write_plate
-from plant.diagram import DiagramConfig, LooseModel, build_diagram
+from executive import load_world
+from executive.app.runs.simulated import simulate
 from plant.models.catalogue import ImportedObject
-from plant.rendering import RENDERER, render_parameters
-from plant.sensors.camera_spec import colour_render_camera
+from plant.scene_pictures import render_view
 from skills.perception.fiducials import find_tags
 from skills.robot import FrameTree, Image, Intrinsics
 
-LENS = Intrinsics(640, 480, 552.0, 552.0, 320.0, 240.0)
+LENS = Intrinsics(640, 480, 552.0, 552.0, 319.5, 239.5)
+WORLD = """\
+directives:
+- add_model: {{name: model, file: "package://world/{file}"}}
+- add_weld:
+    parent: world
+    child: model::{link}
+    X_PC: {{translation: {translation}, rotation: !Rpy {{deg: {rpy_deg}}}}}
+"""
 
 
 def test_a_printed_tag_has_its_size_and_a_white_margin():
@@ -31,12 +40,17 @@ def test_a_printed_tag_has_its_size_and_a_white_margin():
 
 def seen(model, X_WM, X_WC, tag, size_m):
     """Tags in a clean picture of one model, with their poses in the world."""
-    loose = LooseModel("model", model, X_WM, fixed=True)
-    built = build_diagram(DiagramConfig(models=[loose], visuals=False, renderer_parameters=render_parameters()))
-    query = built.scene.query_at(built.plant.GetPositions(built.plant.CreateDefaultContext()))
-    camera = colour_render_camera(LENS, RENDERER)
-    colour = query.RenderColorImage(camera, built.scene_graph.world_frame_id(), X_WC).data[..., :3]
-    grey = cv2.cvtColor(np.ascontiguousarray(colour), cv2.COLOR_RGB2GRAY)
+    rpy_deg = np.degrees(RollPitchYaw(X_WM.rotation()).vector()).tolist()
+    where = {"translation": X_WM.translation().tolist(), "rpy_deg": rpy_deg}
+    link = ET.parse(model).find("model/link").get("name")
+    (model.parent / "world.dmd.yaml").write_text(WORLD.format(file=model.name, link=link, **where))
+    (model.parent / "knowledge.yaml").write_text("start: {x: 0.0, y: 0.0, yaw: 0.0}\n")
+    simulation = simulate(load_world(str(model.parent)), {}, seed=1, record=True)
+    simulation.clock.advance(0.1)
+    query = simulation.query_at(0.1)
+    fov_y_rad = 2.0 * math.atan(0.5 * LENS.height / LENS.fy)
+    colour = render_view(query, X_WC, (LENS.width, LENS.height), fov_y_rad=fov_y_rad)
+    grey = cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY)
     frames = FrameTree({"camera": ("odom", X_WC)})
     image = Image(0.0, "camera", "camera", LENS, LENS, None, grey, np.zeros((0, 0), np.float32), frames)
     return find_tags(image, {tag: size_m})

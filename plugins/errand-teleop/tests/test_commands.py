@@ -13,13 +13,15 @@ from errand_teleop.page import TeleopPage
 from executive.app.prepare.placed_robots import only_robot
 from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.app.runs.simulated import simulate
-from executive.testing.bench import scripted_bench
+from executive.testing.bench import SkillBench
 from executive.view.feed import Feed
 from executive.view.page_control import RefusedError
 from plant.robots.spot.kind import spot_capabilities
 from skills.inputs.errors import InputError
 from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import Pose2D
+from skills.testing.clock import VirtualClock
+from skills.testing.robot import ScriptedRobot
 from tests.executive.cli.calls import refused_in_one_line
 
 OPTIONS = TeleopOptions()
@@ -52,7 +54,8 @@ def test_the_save_key_saves_and_says_so():
 
 @pytest.fixture
 def bench():
-    return scripted_bench(spot_capabilities())[0]
+    clock = VirtualClock()
+    return SkillBench(ScriptedRobot(clock, capabilities=spot_capabilities()), clock)
 
 
 def live_of(feed):

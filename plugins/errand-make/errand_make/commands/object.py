@@ -11,6 +11,8 @@ from typing import Annotated, Any
 
 import typer
 
+from executive import parse
+from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.cli.number_options import OutOfRangeError, quantity_argument, quantity_option
 from executive.cli.options import AS_JSON
 from executive.cli.output import console_for, new_folder, print_json, progress_bar
@@ -26,8 +28,9 @@ _UNITS_M = {None: 0.001, "mm": 0.001, "cm": 0.01, "m": 1.0}
 _SIDES_M = (0.008, 0.6)
 """Least and greatest side of an object that the robot can recognise."""
 
-_HELP = "Objects of your own, from any mesh or photographs."
-object_group = typer.Typer(name="object", help=_HELP, rich_markup_mode=None)
+object_group = typer.Typer(
+    name="object", help="Objects of your own, from any mesh or photographs.", rich_markup_mode=None
+)
 
 
 @object_group.callback()
@@ -110,12 +113,23 @@ def import_command(
         made = importing(mesh, wanted, folder, ImportReports(begin, notes.append))
     for note in notes:
         typer.echo(f"errand: warning: {mesh}: {note}", err=True)
+    if not _can_be_said(made.name):
+        typer.echo(f"errand: warning: no sentence can say '{made.name}'; import it under another name", err=True)
     if (doubt := _unlike_its_class(made)) is not None:
         typer.echo(f"errand: warning: {doubt}", err=True)
     if as_json:
         print_json(_facts(made, out))
     else:
         typer.echo(f"{out}: {_in_words(made)}")
+
+
+def _can_be_said(name: str) -> bool:
+    """True when a sentence finds an object of this name in a world that has it."""
+    known, said = knowledge_of(open_world("flat")), name.replace("_", " ")
+    facts = next(iter(known.things.values())).model_copy(update={"aliases": (said,)})
+    known = known.model_copy(update={"things": {**known.things, name: facts}})
+    found = [each.object for each in parse(f"find the {said}", knowledge=known).commands]
+    return bool(found) and all(each is not None and each.name == name for each in found)
 
 
 @object_group.command()

@@ -11,7 +11,7 @@ from typing import Annotated, Final
 import typer
 
 from errand_make.worlds.wanted import Addition, Wanted
-from executive.app.prepare.worlds import knowledge_of, open_world
+from executive.app.prepare.worlds import knowledge_of, open_world, refuse_unusable, unsayable_names
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START, StartCommand, start_pose
 from executive.cli.output import console_for, new_folder, show_table
@@ -128,9 +128,10 @@ def add(
         str | None, typer.Argument(help="Name of the table, person, room or place; of an object, its class or model.")
     ] = None,
     room: Annotated[str | None, typer.Option("--in", help="The room; of 'room', its former name.")] = None,
+    near: Annotated[str | None, typer.Option(metavar="PLACE", help="The place near which a person stands.")] = None,
     at: Annotated[
         tuple[float, float, float] | None,
-        typer.Option(metavar="X Y YAW", help="Middle (m) and direction of the front (rad); by default at a wall."),
+        typer.Option(metavar="X Y YAW", help="Middle (m) and direction of the front (rad)."),
     ] = None,
     size: Annotated[
         tuple[float, float, float] | None, typer.Option(metavar="W D H", help="Width, depth and height, m.")
@@ -144,7 +145,15 @@ def add(
         raise InputError(f"a {what.value} needs a name", hint=f"write errand world add {what.value} {folder} NAME")
     if not all(map(math.isfinite, (*(at or ()), *(size or ())))):
         raise InputError("--at and --size are numbers", hint="write them in metres and radians")
-    typer.echo(f"{folder}: {add_to_world(folder, Wanted(what, name or '', room, at, size, surface))}")
+    typer.echo(f"{folder}: {add_to_world(folder, Wanted(what, name or '', room, at, size, surface, near))}")
+    _warn_of_names(folder)
+
+
+def _warn_of_names(folder: Path) -> None:
+    """Warns of names of a world that no sentence can say."""
+    changed = open_world(str(folder))
+    for each in unsayable_names(changed, knowledge_of(changed)):
+        typer.echo(f"errand: warning: {each}", err=True)
 
 
 @zone.command("add")
@@ -244,9 +253,19 @@ def show(
             page = out.with_suffix(".html")
             page.write_text(plan_page(drawn, folder, picture), encoding="utf-8")
             typer.echo(f"{page}: open it in a browser")
+    refuse_unusable(drawn)
     counts = [(facts.rooms, "room"), (facts.doors, "door"), (facts.surfaces, "surface"), (facts.zones, "zone")]
     counts += [(facts.poses, "named pose")] if facts.poses else []
     typer.echo(f"{out}: {', '.join(count_text(len(each), noun) for each, noun in counts)}")
+
+
+@world.command("check")
+def check_world(folder: Annotated[str, typer.Argument(metavar="WORLD", help="A world by name or folder.")]) -> None:
+    """Checks the files of a world: maps, models, knowledge, and that each person stands free."""
+    checked = open_world(folder)
+    knowledge_of(checked)
+    refuse_unusable(checked)
+    typer.echo(f"{folder}: can be used")
 
 
 def _made(source: Path, out: Path, make: Callable[[Path], None]) -> None:
@@ -261,3 +280,4 @@ def _made(source: Path, out: Path, make: Callable[[Path], None]) -> None:
     start = f"{made.start.x_m:.2f} {made.start.y_m:.2f} {made.start.yaw_rad:.2f}"
     rooms, doors = count_text(len(facts.rooms), "room"), count_text(len(facts.doors), "door")
     typer.echo(f"{out}: {rooms}, {doors}, start at {start} (m, rad)")
+    _warn_of_names(out)

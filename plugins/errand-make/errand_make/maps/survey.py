@@ -16,8 +16,9 @@ from skills.api import Costmap, PlanningError
 from skills.footprint import Footprint, footprint_clearance_m, pose_array
 from skills.geometry import relative_pose
 from skills.grid_map import GridMap
+from skills.path import LocalController
 from skills.robot import CommandState, FloatArray, Lease, Pose2D, Robot
-from skills.stack import LocalController, RobotStack, stack_of
+from skills.stack import RobotStack, stack_of
 
 _ROUNDS = 1
 """Rounds, once back at the start, in which abandoned frontiers are tried again."""

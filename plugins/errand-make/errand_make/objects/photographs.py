@@ -26,6 +26,7 @@ _BORDER, _MOST_UNLIKE = 0.03, 0.4
 """Width of the border as a part of the photograph's, and its least differing share that is still background."""
 _DIFFERENT, _LIGHTNESS = 10.0, 0.5
 """Least difference in Lab from the background, and its weight of lightness, which a soft shadow changes."""
+_PICTURES: Final = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff", ".bmp", ".avif", ".heic", ".heif")
 _MATTE: Final = "photograph the object before a sheet of one colour that it does not have"
 
 Rgba = NDArray[np.uint8]
@@ -54,9 +55,9 @@ def import_photographs(
 
 def _crops(photographs: Path) -> tuple[list[Rgba], list[InputError]]:
     """The object in each photograph that can be used, and the errors of the others. Raises InputError."""
-    files = sorted(file for file in photographs.iterdir() if file.suffix.lower() in (".png", ".jpg", ".jpeg"))
+    files = sorted(file for file in photographs.iterdir() if file.suffix.lower() in _PICTURES)
     if not FEWEST <= len(files) <= MOST:
-        hint = f"give {FEWEST} to {MOST} photographs from different sides, PNG or JPEG"
+        hint = f"give {FEWEST} to {MOST} photographs from different sides, such as JPEG"
         raise InputError(f"it has {count_text(len(files), 'photograph')}", hint=hint, file=photographs)
     crops, refused = list[Rgba](), list[InputError]()
     for file in files:

@@ -9,13 +9,16 @@ from typing import Final
 import numpy as np
 from pydrake.math import RotationMatrix
 
+from errand_make.robots.drive import Drive
 from errand_make.robots.gripper import rounded
-from errand_make.robots.parts import Drive, Parts, is_camera
+from errand_make.robots.parts import Parts, is_camera
 from errand_make.robots.tree import KinematicTree
 from skills.inputs.errors import listing
 from skills.robot import FloatArray
 
 LIDAR: Final = re.compile(r"lidar|laser|scan|hokuyo|velodyne|rplidar|ouster|sick|(^|_)lds", re.IGNORECASE)
+NEARBY: Final = re.compile(r"sonar|ultraso|cliff|bumper|proximity|(^|_)(ir|tof|us)(_|\d|$)|vl53", re.IGNORECASE)
+"""Links of sensors of a single distance, which are simulated as LiDARs are."""
 _ROUND: Final = 0.08
 _CORNERS: Final = 12
 _CENTRED_M: Final = 0.03

@@ -1,4 +1,4 @@
-"""Checks of a maker's URDF: joints that mimic, limits of driven joints, and leftovers of xacro."""
+"""Checks of a maker's URDF: joints that mimic or stand still, limits of driven joints, and leftovers of xacro."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ from typing import Final
 from xml.etree.ElementTree import Element
 
 from plant.robots.urdf_robot.urdf_file import UrdfFile
-from skills.inputs.errors import suggestion
+from skills.inputs.errors import listing, suggestion
 
 _XACRO: Final = re.compile(r"<xacro:[\w.]+|\$\{[^}\"']*\}?|\$\([^)\"']*\)?")
 _COMMENT: Final = re.compile(r"<!--.*?-->", re.DOTALL)
+LONGEST_SLIDE_M: Final = 5.0
+_STILL: Final = 1e-3
+"""Limit (rad, m) below which a joint cannot be seen to move."""
 
 
 def first_xacro(text: str) -> tuple[int, str]:
@@ -33,6 +36,26 @@ def check_mimics(urdf: UrdfFile) -> None:
             raise urdf.error(element, what, hint or "name a joint of the file, or remove <mimic>")
 
 
+def fix_still_joints(urdf: UrdfFile) -> list[str]:
+    """Gives joints with limits of 0 to 0, as force sensors have them, the type fixed; returns their names.
+
+    Joints that mimic others keep their type. Raises InputError when no joint is left that moves.
+    """
+    elements = {each.get("name", ""): each for each in urdf.robot.findall("joint")}
+    still = list[str]()
+    for name, joint in urdf.joints.items():
+        limit = elements[name].find("limit")
+        given = limit is not None and {"lower", "upper"} <= limit.attrib.keys()
+        if given and joint.kind != "continuous" and joint.moves and not joint.mimics:
+            still += [name] if max(abs(joint.lower), abs(joint.upper)) < _STILL else []
+    if still and not any(each.moves for name, each in urdf.joints.items() if name not in still):
+        what = f"no joint moves: lower and upper of {listing(still)} are both 0"
+        raise urdf.error(elements[still[0]], what, "write the ranges of the joints that move")
+    for name in still:
+        elements[name].set("type", "fixed")
+    return still
+
+
 def check_limits(urdf: UrdfFile, driven: Collection[str]) -> None:
     """Raises InputError for the first driven joint with impossible limits; missing limits are not checked."""
     elements = {each.get("name", ""): each for each in urdf.robot.findall("joint")}
@@ -51,6 +74,8 @@ def _limit_fault(urdf: UrdfFile, name: str, limit: Element) -> tuple[str, str] |
         if joint.lower == joint.upper:
             what = f"lower and upper are both {joint.lower:g}, so it cannot move"
             return what, "write its range, or make it a joint of type fixed"
+        if joint.kind == "prismatic" and joint.upper - joint.lower > LONGEST_SLIDE_M:
+            return f"it slides from {joint.lower:g} to {joint.upper:g} m, probably millimetres", "write metres"
     for key in ("effort", "velocity"):
         value = getattr(joint, key)
         if key in limit.attrib and value <= 0.0:

@@ -51,8 +51,8 @@ def repair_masses(tree: KinematicTree, driven: Collection[str], wheels: Collecti
     if repaired:
         what = "no body has these moments of inertia; fixed links have those of their box instead"
         notes.append(f"{_links(repaired)}: {what}")
-    massless = [link for link in _base_link(tree) if not _mass_kg(urdf, link)]
-    massless += [each for each in wheels if not any(_mass_kg(urdf, link) for link in tree.links_of[each])]
+    massless = [link for link in _base_link(tree) if not link_mass_kg(urdf, link)]
+    massless += [each for each in wheels if not any(link_mass_kg(urdf, link) for link in tree.links_of[each])]
     if massless:
         what = "no mass in the file, so the robot is too light in simulation; write <inertial> with mass and inertia"
         notes.append(f"{_links(massless)}: {what}")
@@ -73,7 +73,7 @@ def _base_link(tree: KinematicTree) -> list[str]:
     return [max(sizes, key=sizes.__getitem__)] if sizes else []
 
 
-def _mass_kg(urdf: UrdfFile, link: str) -> float:
+def link_mass_kg(urdf: UrdfFile, link: str) -> float:
     """Mass of a link, 0 without one. Raises InputError for a negative mass."""
     inertial = urdf.links[link].find("inertial")
     mass = None if inertial is None else inertial.find("mass")
@@ -86,7 +86,7 @@ def _mass_kg(urdf: UrdfFile, link: str) -> float:
 def _refuse_tiny(tree: KinematicTree, moving: Collection[str]) -> None:
     """Raises InputError for a negative mass, and for a driven body that is too light to be simulated."""
     urdf = tree.urdf
-    masses_kg = {link: _mass_kg(urdf, link) for link in urdf.links}
+    masses_kg = {link: link_mass_kg(urdf, link) for link in urdf.links}
     for body in (body for body in tree.links_of if body in moving):
         heavy = [link for link in tree.links_of[body] if masses_kg[link] > 0.0]
         if not heavy:

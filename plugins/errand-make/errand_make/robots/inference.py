@@ -12,14 +12,16 @@ from typing import Any, Final
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from errand_make.robots.base import LIDAR, floor_m, front_rotation, motion_of, outline_polygon
+from errand_make.robots.base import LIDAR, NEARBY, floor_m, front_rotation, motion_of, outline_polygon
 from errand_make.robots.checks import check_limits
+from errand_make.robots.drive import Drive, standing_legs, why_nothing_drives
 from errand_make.robots.gripper import arm_places, hand_axes, measure_gripper, rounded, why_no_gripper
 from errand_make.robots.inertia import repair_masses
-from errand_make.robots.parts import Arm, Drive, Parts, find_parts, is_camera, standing_legs
+from errand_make.robots.parts import LEAST_ARM, Arm, Parts, find_parts, is_camera
 from errand_make.robots.posture import SIDE_WEIGHTS, held_postures, positions
 from errand_make.robots.source import edited_text
 from errand_make.robots.tree import KinematicTree, planar_joints
+from errand_make.robots.units import unit_notes
 from plant.robots.urdf_robot.kind import urdf_kind
 from plant.robots.urdf_robot.robot_file import CameraFile, LidarFile
 from plant.robots.urdf_robot.urdf_file import UrdfFile, UrdfJoint, read_urdf_text
@@ -70,9 +72,8 @@ class Inference:
         self.urdf, self.notes, self.links = urdf, Notes(), ""
         self._sensors, self._text = source.sensors, source.text + read_urdf_text(source.path)
         self._base, tree, parts = self._placed()
-        if parts.drive is Drive.NOTHING:
-            what = "nothing drives: no wheel turns and no leg stands on the floor, so its arm is fixed to the world"
-            hint = "give a base: fix the arm to the URDF of a mobile base, and let its wheels turn (type continuous)"
+        what, hint = why_nothing_drives(tree, parts.drive)
+        if what:
             raise InputError(what, hint=hint, file=source.path, line=int(urdf.links[urdf.root].get("line", "1")))
         self.found = self._hold(tree, parts)
         self.data: dict[str, Any] = {"name": name, "urdf": "robot.urdf", "base": self._base_data()}
@@ -90,6 +91,7 @@ class Inference:
         check_limits(urdf, driven)
         wheels = [each.joint.child for each in self.found.parts.wheels]
         self.notes += [("urdf", note) for note in repair_masses(self.found.tree, driven, wheels)]
+        self.notes += [("urdf", note) for note in unit_notes(self.found.tree, wheels)]
 
     def text(self) -> str:
         """Text of the URDF with its repairs and added links."""
@@ -120,7 +122,7 @@ class Inference:
             front = {90: "y", -90: "-y"}.get(round(math.degrees(yaw_rad)), f"at {math.degrees(yaw_rad):.0f} degrees")
             axis = "x" if abs(float(parts.mounted[0].axis_B[0])) > 0.95 else "a skew axis"
             self.notes.append(("base", f"its wheels turn about {axis}, so the robot's front is {front} of {base}"))
-        if parts.drive is Drive.FREE and (posture := standing_legs(tree)):
+        if parts.drive in (Drive.FREE, Drive.NOTHING) and (posture := standing_legs(tree)):
             tree = replace(tree, posture=posture)
             parts = find_parts(tree)
         for each in parts.wheels:
@@ -156,6 +158,9 @@ class Inference:
             self.notes.append(("arm", f"a further arm ({names}) is held; to drive it, name its joints here instead"))
         for slides in parts.sliding:
             self._note_sliding(slides)
+        if parts.no_arm:
+            why = f"{parts.no_arm}; Errand drives arms of {LEAST_ARM} or more joints that turn, so this one is held"
+            self.notes.append(("held", f"no arm is taken: {why}"))
         return Found(tree, parts, arm, held, ground_m)
 
     def _hold_lift(self, tree: KinematicTree, lift: UrdfJoint, arm: Arm | None, ground_m: float) -> dict[str, float]:
@@ -237,6 +242,7 @@ class Inference:
     def _lidar(self) -> str:
         tree, ground_m = self.found.tree, self.found.ground_m
         found = [*self._simulated("ray|lidar"), *(link for link in self.urdf.links if LIDAR.search(link))]
+        found = [link for link in found if not NEARBY.search(link)]
         fixed = [link for link in dict.fromkeys(found) if tree.body_of[link] == tree.root and not is_camera(link)]
         fixed = [link for link in fixed if float(tree.X_BL[link].translation()[2]) - ground_m > _LEAST_LIDAR_M]
         ahead_m = {link: float(tree.X_BL[link].translation()[0]) for link in fixed}

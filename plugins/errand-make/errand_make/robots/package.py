@@ -6,13 +6,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
+from errand_make.robots.checks import fix_still_joints
 from errand_make.robots.inference import write_robot_file
 from errand_make.robots.meshes import MESHES, MeshCopies
 from errand_make.robots.source import edited_text, read_source
+from errand_make.robots.units import check_extent
 from executive.cli.new_command import PackageTemplates
 from executive.cli.output import console_for, progress_bar
 from plant.robots.robot_kind import robot_kinds
-from skills.inputs.errors import InputError
+from skills.inputs.errors import InputError, listing
 from skills.manipulation.arm.collision import ArmScene
 from skills.manipulation.arm.kinematics import arm_model
 from skills.manipulation.arm.poses import compact_configuration
@@ -37,6 +39,8 @@ def render_robot(name: str, urdf: Path, folder: Path, *, packages: Mapping[str, 
     home = folder / _TEMPLATES.package(name)
     home.mkdir(parents=True)
     source = read_source(urdf, packages)
+    still = fix_still_joints(source)
+    check_extent(source)
     copies = MeshCopies(source, packages, home)
     (home / MESHES).mkdir()
     meshes = copies.meshes()
@@ -54,7 +58,6 @@ def render_robot(name: str, urdf: Path, folder: Path, *, packages: Mapping[str, 
         raise InputError(error.message, hint=error.hint, file=urdf, line=line) from error
     height_m = can.lidar_height_m or 0.0
     words = {
-        "controller": "mppi" if can.base_kind.value == "omnidirectional" else "path_follower",
         "low": f"{height_m - _BAND_M:.2f}",
         "high": f"{height_m + _BAND_M:.2f}",
         "grasp_x": f"{1.38 - (0.0 if can.arm is None else can.arm.standing_m[0]):.2f}",
@@ -63,6 +66,9 @@ def render_robot(name: str, urdf: Path, folder: Path, *, packages: Mapping[str, 
     lacking += [] if can.object_camera is not None else ["look"]
     lacking += [] if can.object_camera is not None and can.gripper is not None else ["take", "grasp"]
     _TEMPLATES.render(name, folder, words=words, without={f"{each}.skilltest.yaml" for each in lacking})
+    if still:
+        what = f"joint{'s' * (len(still) > 1)} {listing(still)}: lower and upper are both 0, so taken as fixed"
+        notes.append(f"urdf: {what}; write the range of one that moves")
     return [*notes, *(f"meshes: {note}" for note in copies.all_notes())]
 
 

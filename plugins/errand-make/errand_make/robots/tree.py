@@ -91,6 +91,11 @@ class KinematicTree:
             found += self.after(each.child)
         return found
 
+    def depth(self, joint: UrdfJoint) -> int:
+        """Number of joints of the longest chain from a joint on, without those that mimic."""
+        below = max((self.depth(each) for each in self.after(joint.child)), default=0)
+        return below + (not joint.mimics)
+
     def links_below(self, joint: UrdfJoint) -> list[str]:
         """Links that a joint carries."""
         return [link for each in self.below(joint) for link in self.links_of[each.child]]

@@ -9,11 +9,12 @@ from typing import Final
 
 from errand_make.worlds import furnish
 from errand_make.worlds.rooms import BANDS_M
-from errand_make.worlds.site import Site, contains, restored
+from errand_make.worlds.site import Site, restored
 from errand_make.worlds.wanted import Addition, Wanted
+from executive.app.prepare.worlds import open_world, refuse_unusable
 from plant.models.catalogue import load_catalogue, read_imported
 from plant.worlds.world import WorldError
-from skills.inputs.errors import InputError, listing, nearest_name
+from skills.inputs.errors import InputError, listing, nearest_name, suggestion
 from skills.robot import Pose2D
 
 
@@ -24,14 +25,16 @@ def add(folder: Path, wanted: Wanted) -> str:
     """
     site = Site.open(folder)
     with restored(folder):
-        return _ADDED.get(wanted.what, _add_furniture)(site, wanted)
+        said = _ADDED.get(wanted.what, _add_furniture)(site, wanted)
+        if wanted.what is Addition.PERSON or wanted.what not in _ADDED:
+            refuse_unusable(open_world(str(folder)))
+    return said
 
 
 def _add_furniture(site: Site, wanted: Wanted) -> str:
     """Adds a piece of furniture; returns a sentence. Raises WorldError."""
     grid, facts = site.grid(), site.facts
-    rooms = {name: Pose2D(each.pose.x, each.pose.y, each.pose.yaw) for name, each in facts.places.items()}
-    room = site.room(wanted.room)
+    rooms, room = site.room_poses, site.room(wanted.room)
     pose = Pose2D(*(wanted.at or (0.0, 0.0, 0.0)))
     piece = furnish.Furniture(wanted.what.value, wanted.name, wanted.size or furnish.SIZES[wanted.what.value], pose)
     if not (min(piece.size) >= 0.3 and max(piece.size) <= 3.0 and piece.size[2] <= 1.2):
@@ -41,7 +44,7 @@ def _add_furniture(site: Site, wanted: Wanted) -> str:
     elif (why := furnish.refusal(site.world, grid, piece, rooms)) is not None:
         raise WorldError(f"{wanted.name} cannot stand at ({pose.x_m:g}, {pose.y_m:g}, {pose.yaw_rad:g}): {why}")
     else:
-        room = next((name for name, outline in facts.rooms.items() if contains(outline, (pose.x_m, pose.y_m))), room)
+        room = site.room_at((pose.x_m, pose.y_m)) or room
     grids = {name: site.grid(name) for name in BANDS_M if (site.folder / "map" / f"{name}.yaml").is_file()}
     furnish.add_furniture(site.folder, piece, room, grids)
     at = f"({piece.pose.x_m:.2f}, {piece.pose.y_m:.2f}, {piece.pose.yaw_rad:.2f})"
@@ -79,10 +82,35 @@ def _model(site: Site, name: str) -> tuple[str, Path | None]:
 
 
 def _add_person(site: Site, wanted: Wanted) -> str:
-    if wanted.room is not None or wanted.at is not None:
-        raise InputError("a person stands beside the robot's start", hint="leave --in and --at out")
-    furnish.add_person(site.folder, site.world, site.grid(), wanted.name, site.room(None))
-    return f"{wanted.name} stands beside the robot's start"
+    """Adds a person: at a pose, in a room, near a place, or else before the robot's start."""
+    world, grid, name, facts = site.world, site.grid(), wanted.name, site.facts
+    near = None if wanted.near is None else facts.place(wanted.near)
+    if wanted.near is not None and near is None:
+        hint = suggestion(wanted.near, facts.place_names())
+        raise InputError(f"there is no place '{wanted.near}'", hint=hint, file=site.folder)
+    if [wanted.room, wanted.near, wanted.at].count(None) < 2:
+        raise InputError("--in, --near and --at each say where the person stands", hint="give one of them")
+    if wanted.at is None and wanted.room is None and near is None:
+        before = furnish.person_before_start(world, grid)
+        if before is not None:
+            furnish.add_person(site.folder, name, site.room(None), before)
+            return f"{name} stands beside the robot's start"
+    pose = Pose2D(*(wanted.at or (0.0, 0.0, 0.0)))
+    piece = furnish.Furniture(furnish.PERSON, name, furnish.PERSON_SIZE, pose)
+    surfaces = ((each, enumerate(surface.viewpoints)) for each, surface in facts.surfaces.items())
+    views = {f"{each} {number}": view.pose_2d() for each, seen in surfaces for number, view in seen}
+    kept = {**site.room_poses, **views}
+    if wanted.at is None:
+        room = facts.room(near) if near is not None else site.room(wanted.room)
+        about = facts.place_pose(near or room) if near or wanted.room else facts.start
+        spot = (about.x, about.y)
+        piece = furnish.place_person(world, grid, name, facts.rooms[room], site.doors, kept, spot)
+    elif (why := furnish.refusal(world, grid, piece, kept)) is not None:
+        raise WorldError(f"{name} cannot stand at ({pose.x_m:g}, {pose.y_m:g}, {pose.yaw_rad:g}): {why}")
+    x, y, yaw = piece.pose.x_m, piece.pose.y_m, piece.pose.yaw_rad
+    room = site.room_at((x, y))
+    furnish.add_person(site.folder, name, room, {"pose": {"x": x, "y": y, "yaw": yaw}})
+    return f"{name} stands in the {room} at ({x:.2f}, {y:.2f}, {yaw:.2f})"
 
 
 def _add_dock(site: Site, wanted: Wanted) -> str:

@@ -14,6 +14,17 @@ from numpy.typing import NDArray
 from shapely.geometry import LineString, MultiLineString
 from shapely.ops import linemerge
 
+from errand_make.worlds.building_file import (
+    EDGES,
+    HINT,
+    LevelFrame,
+    building_levels,
+    level_edges,
+    level_floors,
+    level_frame,
+    level_vertices,
+    listed,
+)
 from errand_make.worlds.rooms import (
     FREE,
     LEAST_ROOM_M2,
@@ -34,8 +45,6 @@ from skills.robot import FloatArray, Pose2D
 
 _CELL_M: Final = 0.05
 _MOST_CELLS: Final = 16_000_000
-_USUAL_SCALE_M: Final = 0.05
-"""Metres of a pixel that the traffic editor assumes."""
 _WALL_M: Final = 0.1
 _LANE_M: Final = 1.2
 """Width of the free ground along a lane; the preferred zone is half as wide."""
@@ -44,11 +53,8 @@ _AROUND_M: Final = 1.0
 _BESIDE_DOOR_M: Final = 0.4
 _FAR_M: Final = 1.0
 """Largest distance between a named vertex and a pose that is free for the body."""
-_HINT: Final = "save the building again in the traffic editor"
 _SUFFIXES: Final = (".building.yaml", ".building.yml")
-_MOST_APART: Final = 1.05
-"""Largest ratio of the scales that two measurements give without a warning."""
-_LEFT_OUT: Final = ("models", "fiducials", "human_lanes")
+_LEFT_OUT: Final = ("models", "human_lanes")
 
 Segment = tuple[Point, Point]
 
@@ -86,7 +92,7 @@ def read_building(source: YamlSource, *, level: str | None, scale_m: float | Non
 
     Raises InputError when the level is not there, its coordinates are geographic, or an edge names no vertex.
     """
-    levels, notes = _levels(source), list[str]()
+    levels, notes = building_levels(source), list[str]()
     if level is not None and level not in levels:
         raise source.error(("levels",), f"there is no level '{level}'", suggestion(level, list(levels)))
     name = level or next(iter(levels))
@@ -97,14 +103,13 @@ def read_building(source: YamlSource, *, level: str | None, scale_m: float | Non
         what = f"its coordinates are of the kind '{system}', and only drawings and metres are read"
         hint = "draw the building on a floor plan in the traffic editor, or begin from a map of ROS map_server"
         raise source.error(("coordinate_system",), what, hint)
+    metric = system == "cartesian_meters"
     path, part = ("levels", name), levels[name]
-    vertices = list(_vertices(source, path, part))
-    edges = {key: list(_edges(source, path, part, key, len(vertices))) for key in _EDGES}
-    flip = 1.0 if system == "cartesian_meters" else -1.0
-    if system == "reference_image":
-        scale_m = scale_m or _measured_scale(source, (*path, "measurements"), vertices, edges["measurements"], notes)
-    points = [((scale_m or 1.0) * x, flip * (scale_m or 1.0) * y) for x, y, _, _ in vertices]
-    floors = tuple(tuple(points[n] for n in each) for each in _floors(source, path, part, len(vertices)))
+    vertices = list(level_vertices(source, path, part))
+    edges = {key: list(level_edges(source, path, part, key, len(vertices))) for key in EDGES}
+    frame = LevelFrame(1.0) if metric else level_frame(source, name, scale_m, notes)
+    points = [frame.point(x, y if metric else -y) for x, y, _, _ in vertices]
+    floors = tuple(tuple(points[n] for n in each) for each in level_floors(source, path, part, len(vertices)))
     named, first = dict[str, Point](), dict[str, int]()
     for n, (point, (_, _, each, _)) in enumerate(zip(points, vertices, strict=True)):
         line = source.line((*path, "vertices", n))
@@ -122,123 +127,20 @@ def read_building(source: YamlSource, *, level: str | None, scale_m: float | Non
     segments = {key: tuple((points[a], points[b]) for a, b, _ in those if a != b) for key, those in edges.items()}
     made = Building(segments["walls"], segments["doors"], segments["lanes"], floors, named, tuple(starts), tuple(notes))
     if not len(made.points):
-        raise source.error(path, f"the level {name} has no walls, floors, lanes or names", _HINT)
+        raise source.error(path, f"the level {name} has no walls, floors, lanes or names", HINT)
     if not made.walls:
         what = f"line {source.line(path)}: the level {name} has no walls, so nothing bounds or divides its rooms"
         return replace(made, notes=(*made.notes, f"{what}; draw them in the traffic editor"))
     return made
 
 
-def _levels(source: YamlSource) -> dict[str, Any]:
-    """Levels of a building by name. Raises InputError for a file without any."""
-    if source.data is None:
-        raise source.error((), "the building file is empty", _HINT)
-    if not isinstance(source.data, dict):
-        raise source.error((), "it is no building of Open-RMF: a building begins with the key levels", _HINT)
-    levels = source.data.get("levels")
-    if not levels:
-        raise source.error(("levels",), "the building has no levels", _HINT)
-    if not isinstance(levels, dict):
-        raise source.error(("levels",), "the levels of the building have no names", _HINT)
-    return levels
-
-
 def _left_out(source: YamlSource, path: tuple[str | int, ...], part: Any) -> Iterator[str]:
     """Notes on the parts of a level and of the building that a world has no form for."""
     for key in _LEFT_OUT:
-        if many := len(_listed(source, path, part, key)):
+        if many := len(listed(source, path, part, key)):
             yield f"{count_text(many, key[:-1].replace('_', ' '))} of the level: left out"
     if isinstance(lifts := source.data.get("lifts"), dict) and lifts:
         yield f"{count_text(len(lifts), 'lift')}: left out"
-
-
-_EDGES: Final = ("walls", "doors", "lanes", "measurements")
-
-
-def _vertices(
-    source: YamlSource, path: tuple[str | int, ...], part: Any
-) -> Iterator[tuple[float, float, str, dict[str, Any]]]:
-    """Coordinates, name and facts of each vertex. Raises InputError."""
-    for n, each in enumerate(_listed(source, path, part, "vertices")):
-        numbers = each[:2] if isinstance(each, list) else []
-        if len(numbers) < 2 or not all(type(v) in (int, float) and math.isfinite(v) for v in numbers):
-            raise source.error((*path, "vertices", n), f"vertex {n} has no x and y", _HINT)
-        name = each[3] if len(each) > 3 and each[3] is not None else ""
-        yield float(numbers[0]), float(numbers[1]), " ".join(str(name).replace("_", " ").split()), _facts(each[4:])
-
-
-def _edges(
-    source: YamlSource, path: tuple[str | int, ...], part: Any, key: str, count: int
-) -> Iterator[tuple[int, int, dict[str, Any]]]:
-    """The two vertices and the facts of each edge. Raises InputError."""
-    for n, each in enumerate(_listed(source, path, part, key)):
-        ends = each[:2] if isinstance(each, list) else []
-        if len(ends) < 2:
-            raise source.error((*path, key, n), f"{key[:-1]} {n} does not begin with the numbers of 2 vertices", _HINT)
-        _check_vertices(source, (*path, key, n), f"{key[:-1]} {n}", ends, count)
-        yield ends[0], ends[1], _facts(each[2:])
-
-
-def _floors(source: YamlSource, path: tuple[str | int, ...], part: Any, count: int) -> Iterator[list[int]]:
-    for n, each in enumerate(_listed(source, path, part, "floors")):
-        corners = each.get("vertices") if isinstance(each, dict) else None
-        if not isinstance(corners, list):
-            raise source.error((*path, "floors", n), f"floor {n} has no list of vertices", _HINT)
-        _check_vertices(source, (*path, "floors", n), f"floor {n}", corners, count)
-        if len(corners) > 2:
-            yield corners
-
-
-def _check_vertices(
-    source: YamlSource, path: tuple[str | int, ...], what: str, numbers: Sequence[Any], count: int
-) -> None:
-    """Raises InputError for the first number that no vertex has."""
-    for each in numbers:
-        if type(each) is not int or not 0 <= each < count:
-            known = f"the level has the vertices 0 to {count - 1}" if count else "the level has no vertices"
-            hint = f"correct the number, or {_HINT}"
-            raise source.error(path, f"{what} names vertex {each!s:.40}, and {known}", hint)
-
-
-def _listed(source: YamlSource, path: tuple[str | int, ...], part: Any, key: str) -> list[Any]:
-    found = part.get(key) if isinstance(part, dict) else None
-    if found is not None and not isinstance(found, list):
-        raise source.error((*path, key), f"{key} is no list", _HINT)
-    return found or []
-
-
-def _facts(rest: Sequence[Any]) -> dict[str, Any]:
-    """Values of the facts of a vertex or an edge, each written as [type, value]."""
-    facts = rest[0] if rest and isinstance(rest[0], dict) else {}
-    return {key: value[1] if isinstance(value, list) and len(value) == 2 else value for key, value in facts.items()}
-
-
-def _measured_scale(
-    source: YamlSource,
-    path: tuple[str | int, ...],
-    vertices: Sequence[tuple[float, float, str, Any]],
-    measured: Sequence[tuple[int, int, Any]],
-    notes: list[str],
-) -> float:
-    """Metres of a pixel: the mean of the measurements; without any, that of the traffic editor.
-
-    Notes say when there is none, or when two contradict each other.
-    """
-    scales = list[tuple[float, int]]()
-    for n, (a, b, facts) in enumerate(measured):
-        pixels, metres = math.dist(vertices[a][:2], vertices[b][:2]), facts.get("distance")
-        if pixels > 0.0 and type(metres) in (int, float) and 0.0 < metres < math.inf:
-            scales.append((metres / pixels, source.line((*path, n))))
-    if not scales:
-        notes.append(f"no measurement gives its scale: a pixel counts as {_USUAL_SCALE_M:g} m (--scale sets another)")
-        return _USUAL_SCALE_M
-    mean_m = sum(scale for scale, _ in scales) / len(scales)
-    (low, at), (high, other) = min(scales), max(scales)
-    if high > _MOST_APART * low:
-        each = f"a pixel is {low:.3g} m by line {at}, {high:.3g} m by line {other}"
-        taken = f"their mean of {mean_m:.3g} m is taken: correct the wrong one, or give --scale"
-        notes.append(f"its measurements contradict each other: {each}; {taken}")
-    return mean_m
 
 
 def building_grid(building: Building) -> Grid:

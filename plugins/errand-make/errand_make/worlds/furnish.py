@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import shapely
 
 from errand_make.mesh import Material, Mesh, mtl_text, obj_text, palette_picture, write_text
 from errand_make.shapes import Box, Model, model_sdf
@@ -29,6 +30,7 @@ from executive.app.prepare.worlds import open_world
 from executive.words.slug import slug
 from plant.scene_pictures import save_png
 from plant.worlds.geometry_files import OWN_PACKAGE
+from plant.worlds.seeding import place_people
 from plant.worlds.world import World, WorldError
 from skills.inputs.errors import InputError
 from skills.inputs.yaml_source import parse_yaml, read_yaml, yaml_of
@@ -38,6 +40,9 @@ Size = tuple[float, float, float]
 """Width along the front, depth and height, in metres."""
 SIZES: Final[Mapping[str, Size]] = {"table": (1.2, 0.7, 0.75), "desk": (1.4, 0.7, 0.74), "shelf": (0.9, 0.4, 0.9)}
 """Kinds of furniture, each with a flat top for objects."""
+PERSON: Final = "person"
+PERSON_SIZE: Final[Size] = (0.5, 0.5, 1.7)
+"""Size of what a person takes up, with some clearance."""
 VIEW_M: Final = 0.92
 """Distance of a viewpoint from the front edge, m."""
 _BOARD_M, _LEG_M = 0.03, 0.05
@@ -47,6 +52,11 @@ _FROM_DOOR_M, _FROM_START_M, _STEP_M, _BEHIND_M, _BESIDE_M, _SPARE_M = 0.9, 1.6,
 _PERSON_M: Final = (1.05, 1.35)
 """Range of the distance between the start and a person who stands before it, m."""
 _PERSON_RADIUS_M: Final = 0.35
+_APART_M: Final = 1.0
+"""Distance of a person from other people, the start, and the poses of places."""
+_PERSON_CLEAR_M: Final = 0.5
+_MOST_TRIED: Final = 200
+_SEEDS: Final = 6
 _BEARINGS: Final = tuple(k * math.pi / 8 for k in (3, -3, 2, -2, 4, -4, 1, -1, 0))
 """Bearings of a person, seen from the start; the way ahead is the last choice."""
 _COMMON_FACTS: Final = "flat"
@@ -72,6 +82,8 @@ class Furniture:
         """Collision shapes in its own frame: x to the front, z up, on the floor."""
         width, depth, height = self.size
         below = height - _BOARD_M
+        if self.kind == PERSON:
+            return (Box(size=(depth, width, height), p=(0.0, 0.0, height / 2)),)
         top = Box(size=(depth, width, _BOARD_M), p=(0.0, 0.0, height - _BOARD_M / 2.0))
         if self.kind == "table":
             at = [(i * (depth / 2 - _LEG_M), j * (width / 2 - _LEG_M), below / 2) for i in (-1, 1) for j in (-1, 1)]
@@ -138,12 +150,15 @@ def refusal(world: World, grid: Grid, piece: Furniture, rooms: Mapping[str, Pose
     if not place.any() or np.any(grid.cells[place] != FREE):
         return "it touches a wall or lies outside"
     after = with_furniture(grid, piece, BANDS_M["keepout"])
-    clearance = clearance_m(after)
+    clearance, outline = clearance_m(after), shapely.Polygon(piece.outline())
+    for other, at in people_W(world):
+        if outline.dwithin(shapely.Point(at), _PERSON_RADIUS_M / 2.0):
+            return f"{other} stands there"
     if min(body_margin_m(after, clearance, pose) for pose in piece.viewpoints()) < _SPARE_M:
-        return "the robot cannot stand before its front"
+        return "there is no room for the robot in front"
     kept = {**rooms, "": world.start}
     if any(body_margin_m(after, clearance, pose) < 0.0 for pose in kept.values()):
-        return "it stands where the robot starts, or where it stands in a room"
+        return "it stands where the robot starts, or from where it looks at a room or surface"
     reached = reached_cells(clearance, after, world.start)
     if not all(_in(reached, after, pose) for pose in (*kept.values(), *piece.viewpoints())):
         return "the robot could no longer reach all rooms and its front"
@@ -155,7 +170,7 @@ def place_in(
 ) -> Furniture:
     """Returns the piece with its back at a wall of a room, far from doors. Raises WorldError when it fits nowhere."""
     found = sorted(_spots(world, grid, piece, room, doors), key=lambda each: each[0], reverse=True)
-    for _, moved in found[:200]:
+    for _, moved in found[:_MOST_TRIED]:
         if refusal(world, grid, moved, rooms) is None:
             return moved
     raise WorldError(f"a {piece.kind} of {piece.size[0]:g} x {piece.size[1]:g} m fits at no wall of that room")
@@ -252,20 +267,51 @@ def add_object(folder: Path, name: str, surface: str, *, thing: str, model: Path
     write_text(rules, with_entry(rules, "objects", None, rule, usual=_RULES))
 
 
-def add_person(folder: Path, world: World, grid: Grid, name: str, place: str) -> None:
-    """Puts a person before the robot's start, where there is room. Raises WorldError when there is none."""
-    clearance, start = clearance_m(grid), world.start
+def people_W(world: World) -> list[tuple[str, Point]]:
+    """Returns the points where some seeds place each person, with the person's name."""
+    placed = [each for seed in range(_SEEDS) for each in place_people(world, seed)]
+    return [(each.name, (float(each.X_WO.translation()[0]), float(each.X_WO.translation()[1]))) for each in placed]
+
+
+def person_before_start(world: World, grid: Grid) -> Mapping[str, Any] | None:
+    """Returns ranges before the robot's start where a person has clearance, apart from others; None without any."""
+    clearance, start, others = clearance_m(grid), world.start, [at for _, at in people_W(world)]
     for bearing in _BEARINGS:
         yaw = start.yaw_rad + bearing
         at = [(start.x_m + r * math.cos(yaw), start.y_m + r * math.sin(yaw)) for r in (*_PERSON_M, sum(_PERSON_M) / 2)]
-        if min(_free(grid, clearance, each) for each in at) > _PERSON_RADIUS_M:
-            break
-    else:
-        raise WorldError("there is no room for a person before the robot's start; choose another start")
-    about = [round(bearing - 0.05, 3), round(bearing + 0.05, 3)]
-    rule = {"name": name, "distance_m": list(_PERSON_M), "bearing_rad": about, "turned_rad": [-0.2, 0.2]}
+        apart = all(math.dist(each, other) > _APART_M for each in at for other in others)
+        if apart and min(_free(grid, clearance, each) for each in at) > _PERSON_RADIUS_M:
+            about = [round(bearing - 0.05, 3), round(bearing + 0.05, 3)]
+            return {"distance_m": list(_PERSON_M), "bearing_rad": about, "turned_rad": [-0.2, 0.2]}
+    return None
+
+
+def place_person(
+    world: World, grid: Grid, name: str, room: Sequence[Point], doors: Sequence[Point], rooms: Any, about: Point
+) -> Furniture:
+    """Returns a person in a room as near to a point as is free, turned to it, apart from doors, places and others.
+
+    Raises WorldError when there is no such place.
+    """
+    rows, columns = np.nonzero(clearance_m(grid) > _PERSON_CLEAR_M)
+    spots = (np.column_stack([columns, rows]) + 0.5) * grid.resolution_m + grid.origin_m
+    spots = spots[shapely.contains_xy(shapely.Polygon(room), *spots.T)]
+    kept = [(pose.x_m, pose.y_m) for pose in (world.start, *rooms.values())]
+    for other in (*kept, *doors, *(at for _, at in people_W(world))):
+        spots = spots[np.hypot(*(spots - other).T) > _APART_M]
+    nearest = spots[np.argsort(np.hypot(*(spots - about).T), kind="stable")].round(2)
+    for x, y in nearest[:: max(1, len(nearest) // _MOST_TRIED)].tolist():
+        facing = round(math.atan2(about[1] - y, about[0] - x), 2)
+        piece = Furniture(PERSON, name, PERSON_SIZE, Pose2D(x, y, facing))
+        if refusal(world, grid, piece, rooms) is None:
+            return piece
+    raise WorldError("there is no free place for a person; name one by --at X Y YAW, or another room by --in")
+
+
+def add_person(folder: Path, name: str, place: str, where: Mapping[str, Any]) -> None:
+    """Writes a person into a world: where they stand, and their usual place. Raises WorldError for a taken name."""
     knowledge = with_entry(folder / "knowledge.yaml", "people", name, {"at": place})
-    rules = with_entry(folder / "objects.yaml", "people", None, rule, usual=_RULES)
+    rules = with_entry(folder / "objects.yaml", "people", None, {"name": name, **where}, usual=_RULES)
     write_text(folder / "knowledge.yaml", knowledge)
     write_text(folder / "objects.yaml", rules)
 

@@ -16,8 +16,8 @@ from plant.worlds.world import World
 from skills.robot import Picture
 
 _TEMPLATE: Final = Path(__file__).with_name("plan_page.html.template")
-_KINDS: Final = (*(kind.value for kind in Addition if kind is not Addition.PERSON), "zone", "start")
-"""What the page adds; a person stands beside the start and takes no pose."""
+_KINDS: Final = (*(kind.value for kind in Addition), "zone", "start")
+"""What the page adds."""
 
 
 def plan_page(world: World, name: str, picture: Picture) -> str:

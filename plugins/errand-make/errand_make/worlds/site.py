@@ -16,6 +16,7 @@ from executive.words.knowledge import Knowledge
 from plant.worlds.world import World, WorldError
 from skills.grid_map import load_grid_map
 from skills.inputs.errors import InputError, suggestion
+from skills.robot import Pose2D
 
 
 def contains(polygon: Sequence[tuple[float, float]], point: tuple[float, float]) -> bool:
@@ -55,10 +56,19 @@ class Site:
         """Returns the room of a name; without one, the room of the start. Raises InputError."""
         rooms, start = self.facts.rooms, (self.world.start.x_m, self.world.start.y_m)
         if said is None:
-            return next((name for name, outline in rooms.items() if contains(outline, start)), next(iter(rooms), ""))
+            return self.room_at(start) or next(iter(rooms), "")
         if (found := self.facts.place(said)) in rooms:
             return str(found)
         raise InputError(f"there is no room '{said}'", hint=suggestion(said, rooms), file=self.folder)
+
+    def room_at(self, point: tuple[float, float]) -> str:
+        """Returns the room around a point, or an empty name."""
+        return next((name for name, outline in self.facts.rooms.items() if contains(outline, point)), "")
+
+    @property
+    def room_poses(self) -> dict[str, Pose2D]:
+        """Pose of the robot in each room, and the named poses."""
+        return {name: place.pose.pose_2d() for name, place in self.facts.places.items()}
 
 
 @contextmanager

@@ -29,3 +29,4 @@ class Wanted:
     at: tuple[float, float, float] | None = None
     size: tuple[float, float, float] | None = None
     surface: str | None = None
+    near: str | None = None

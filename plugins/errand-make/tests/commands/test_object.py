@@ -7,7 +7,7 @@ import sys
 import cv2
 import pytest
 
-from plant.worlds.world import WORLDS_FOLDER
+from executive import load_world
 from tests.executive.cli.calls import done, errand, json_of, refusal
 
 trimesh = pytest.importorskip("trimesh")
@@ -47,6 +47,12 @@ def test_a_size_that_its_class_never_has_is_warned_of(mesh, tmp_path):
         "errand: warning: drill is 0.600 m long; of class screwdriver the robot expects 0.08 to 0.45 m, "
         "and may not find it\n"
     )
+
+
+@pytest.mark.parametrize(("name", "warned"), [("it", True), ("please", True), ("oil_can", False), ("two_cups", False)])
+def test_a_name_that_no_sentence_can_say_is_warned_of(mesh, tmp_path, name, warned):
+    result = errand("object", "import", mesh, "--name", name, "--mass", 1.2, "--out", tmp_path / "made")
+    assert (f"no sentence can say '{name}'" in result.stderr) is warned and result.exit_code == 0
 
 
 def test_show_prints_the_same_json_as_import(mesh, tmp_path):
@@ -102,7 +108,7 @@ def test_an_imported_object_that_is_the_only_one_of_its_class_counts_with_its_ma
 
 def copy_of_flat(folder, old, new, *, imports):
     """The flat with other objects."""
-    shutil.copytree(WORLDS_FOLDER / "flat", folder)
+    shutil.copytree(load_world("flat").folder, folder)
     path = folder / "objects.yaml"
     text = path.read_text()
     assert old in text

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from errand_make.worlds.plan_picture import plan_view
+from executive import load_world
 from executive.words.knowledge import load_knowledge
-from plant.worlds.world import load_world
 from tests.executive.cli.calls import done
 
 pytest_plugins = ["tests.browser"]

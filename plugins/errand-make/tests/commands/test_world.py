@@ -1,14 +1,17 @@
 """`errand world`, and `errand run` in what it makes."""
 
+import math
+from itertools import combinations
 from pathlib import Path
 
 import cv2
 import pytest
+import shapely
 
-import executive
+from executive import check, load_world
+from executive.app.runs.simulated import simulate
 from executive.words.knowledge import load_knowledge
-from plant.worlds.seeding import place_objects
-from plant.worlds.world import load_world
+from plant.worlds.seeding import place_people
 from tests.executive.cli.calls import done, errand, json_of, refusal
 
 
@@ -25,17 +28,31 @@ def test_a_goal_is_reached_in_a_world_made_of_a_map(map_file, tmp_path):
     assert report["sim_time_s"] < 8.0  # from the start that was given, a metre away
 
 
+def lying(world, seed):
+    """Class and surface of each object that the seed lays in the plant of a world, by name."""
+    simulation = simulate(world, {}, seed=seed, record=False)
+    simulation.clock.advance(1.0)
+    tops = {name: shapely.Polygon(top.polygon_W) for name, top in world.surfaces.items()}
+    found = {}
+    for name, each in simulation.referee.objects.items():
+        x, y, z = each.rests_W[-1]
+        (surface,) = (top for top, outline in tops.items() if outline.contains(shapely.Point(x, y)))
+        assert 0.0 < z - world.surfaces[surface].height_m < 0.2
+        found[name] = each.class_name, surface
+    return found
+
+
 def add(*words):
     added = done("world", "add", *words)
     return added.stdout
 
 
 def test_a_world_of_a_map_has_a_person_and_a_dock_unless_they_are_not_wanted(own, tmp_path):
-    facts = load_world(own)
+    facts = load_world(str(own))
     assert (facts.dock is not None, [person.name for person in facts.seed_rules.people]) == (True, ["Robin"])
     bare = ("world", "from-map", tmp_path / "room.yaml", "--out", tmp_path / "bare", "--no-dock", "--person", "")
     done(*bare)
-    assert (load_world(tmp_path / "bare").dock, (tmp_path / "bare" / "objects.yaml").exists()) == (None, False)
+    assert (load_world(str(tmp_path / "bare")).dock, (tmp_path / "bare" / "objects.yaml").exists()) == (None, False)
 
 
 def test_a_room_gets_its_name_in_all_facts(own):
@@ -50,25 +67,29 @@ def test_a_named_pose_is_a_place_to_go_to_and_no_room(own):
     assert add("place", own, "pump", "--at", 3.5, 1.5, 1.57).endswith("pump at (3.50, 1.50, 1.57)\n")
     knowledge = load_knowledge(own / "knowledge.yaml")
     assert (knowledge.poses, set(knowledge.rooms)) == (("pump",), {"room 1", "room 2"})
-    checked = executive.check("go to the pump", world=str(own))
+    checked = check("go to the pump", world=str(own))
     assert checked.ok
     assert [str(command) for command in checked.trees[0].commands] == [
         "Take [Nothing] to [pump] and do [Nothing] to [Nothing]"
     ]
 
 
+def test_a_name_that_no_sentence_can_say_is_warned_of(own):
+    added = done("world", "add", "place", own, "#", "--at", 3.5, 1.5, 1.57)
+    assert "knowledge.yaml" in added.stderr and "places.#: no sentence can say this name" in added.stderr
+
+
 @pytest.mark.parametrize("kind", ["table", "desk", "shelf"])
 def test_furniture_stands_at_a_wall_and_the_robot_finds_an_object_on_it(own, kind):
     add(kind, own, "big one", "--in", "room 1")
     add("object", own, "coke", "--on", "big one")
-    knowledge, world = load_knowledge(own / "knowledge.yaml"), load_world(own)
+    knowledge, world = load_knowledge(own / "knowledge.yaml"), load_world(str(own))
     top = knowledge.surfaces["big one"]
     assert (top.place, len(top.viewpoints)) == ("room 1", 1)
     assert knowledge.usual_surfaces("drink") == ("big one",)
-    placed = [each for each in place_objects(world, 3) if each.surface == "big one"]
-    assert len(placed) == 1
+    assert lying(world, 3) == {"coke": ("coke", "big one")}
     for sentence in ("fetch me a coke", "go to the big one"):
-        assert executive.check(sentence, world=str(own)).ok
+        assert check(sentence, world=str(own)).ok
 
 
 def test_furniture_is_on_the_map_at_the_heights_of_its_parts(own):
@@ -86,7 +107,64 @@ def test_two_pieces_two_people_and_comments_stand_together_in_the_files(own):
     knowledge = load_knowledge(file)
     assert (set(knowledge.surfaces), set(knowledge.people)) == ({"one", "two"}, {"Robin", "Kim"})
     assert file.read_text().startswith("# mine\n")
-    assert len(load_world(own).seed_rules.fronts) == 2
+    assert len(load_world(str(own)).seed_rules.fronts) == 2
+
+
+def places(world, seed):
+    """Point and room of each person, as the seed places them."""
+    facts = load_world(str(world))
+    points = {each.name: each.X_WO.translation()[:2].tolist() for each in place_people(facts, seed)}
+    rooms = {name: shapely.Polygon(outline) for name, outline in facts.rooms.items()}
+    return {
+        name: (at, next(room for room, outline in rooms.items() if outline.contains(shapely.Point(at))))
+        for name, at in points.items()
+    }
+
+
+def test_people_without_a_place_stand_apart_before_the_start_and_then_in_its_room(own):
+    said = [add("person", own, name) for name in ("Kim", "Noor", "Ada")]
+    assert ["beside the robot's start" in each for each in said] == [True, True, False]
+    for seed in range(20):
+        stood = places(own, seed)
+        assert min(math.dist(a, b) for (a, _), (b, _) in combinations(stood.values(), 2)) > 0.9
+        assert {room for _, room in stood.values()} == {"room 1"}
+
+
+def test_a_person_stands_in_a_room_at_a_pose_or_near_a_place(own_table):
+    add("place", own_table, "pump", "--at", 12.0, 2.5, 0.0)
+    add("person", own_table, "Eve", "--in", "room 2")
+    add("person", own_table, "Max", "--near", "pump")
+    assert "Zoe stands in the room 1 at (3.50, 3.50, 0.00)" in add("person", own_table, "Zoe", "--at", 3.5, 3.5, 0.0)
+    stood = places(own_table, 0)
+    assert (stood["Eve"][1], stood["Max"][1], stood["Zoe"][0]) == ("room 2", "room 2", [3.5, 3.5])
+    assert 1.0 < math.dist(stood["Max"][0], (12.0, 2.5)) < 1.6
+    assert {name: each.at for name, each in load_knowledge(own_table / "knowledge.yaml").people.items()} == {
+        "Robin": "room 1", "Eve": "room 2", "Max": "room 2", "Zoe": "room 1"
+    }  # fmt: skip
+
+
+def test_a_person_near_a_surface_does_not_stand_from_where_the_robot_looks_at_it(own_table):
+    (view,) = load_knowledge(own_table / "knowledge.yaml").surfaces["table"].viewpoints
+    add("person", own_table, "Pat", "--near", "table")
+    assert 0.5 < math.dist(places(own_table, 0)["Pat"][0], (view.x, view.y)) < 2.0
+    assert "from where it looks" in refusal("world", "add", "person", own_table, "Kim", "--at", view.x, view.y, 0.0)
+
+
+def test_nothing_is_put_where_a_person_stands(own):
+    add("person", own, "Zoe", "--at", 3.5, 3.5, 0.0)
+    files = {file: file.read_bytes() for file in own.rglob("*.yaml")}
+    for words in (("person", own, "Tim", "--at", 3.6, 3.8, 0.0), ("table", own, "bar", "--at", 3.5, 3.5, 0.0)):
+        assert "Zoe stands there" in refusal("world", "add", *words)
+    assert {file: file.read_bytes() for file in own.rglob("*.yaml")} == files
+
+
+def test_a_world_in_which_people_overlap_is_drawn_and_refused(own, tmp_path):
+    done("world", "check", own)
+    file = own / "objects.yaml"
+    file.write_text(file.read_text() + "  - {name: Kim, route: {waypoints: [[2.2, 1.0]]}}\n")
+    assert "Kim would stand in walls at (2.20, 1.00)" in refusal("world", "check", own)
+    assert "objects.yaml:11: Kim would stand in walls" in refusal("world", "show", own, "--out", tmp_path / "own.png")
+    assert (tmp_path / "own.png").is_file()
 
 
 def zone(*words):
@@ -104,7 +182,7 @@ def test_zones_are_added_listed_and_removed_and_comments_stay(own):
     zones = load_knowledge(file).zones
     assert (zones["slow"].polygon, zones["private"].place) == (((3.0, 0.0), (5.0, 0.0), (5.0, 2.0)), "room 2")
     assert file.read_text().startswith("# mine\n")
-    (error,) = executive.check("go to room 2", world=str(own)).errors
+    (error,) = check("go to room 2", world=str(own)).errors
     assert error.message.startswith("The private is a keep-out zone.")
     for name in ("slow", "private"):
         assert zone("remove", own, name).exit_code == 0
@@ -137,10 +215,10 @@ def test_an_imported_model_is_added_and_imported_by_the_world(own, mesh, tmp_pat
     for name in ("drill", "saw"):
         done("object", "import", mesh, "--name", name)
         assert add("object", "own", name, "--on", "rack") == f"own: {name} on the rack\n"
-    world = load_world(own)
+    world = load_world(str(own))
     assert {name: each.folder for name, each in world.imports.items()} == {n: tmp_path / n for n in ("drill", "saw")}
-    assert {each.name: each.surface for each in place_objects(world, 1)} == {"drill": "rack", "saw": "rack"}
-    assert executive.check("fetch me the drill", world="own").ok
+    assert lying(world, 1) == {"drill": ("drill", "rack"), "saw": ("saw", "rack")}
+    assert check("fetch me the drill", world="own").ok
     hint = "there are beer, coke, extinguisher, hammer, screwdriver, wrench, person, cylinder, cube, saw and drill"
     assert hint in refusal("world", "add", "object", "own", "rocket", "--on", "rack")
 
@@ -150,7 +228,7 @@ def test_a_model_of_a_known_class_is_added_under_its_own_name(own, mesh, tmp_pat
     add("table", own, "rack")
     done("object", "import", mesh, "--name", "my_wrench", "--class", "wrench")
     add("object", "own", "my_wrench", "--on", "rack")
-    assert [(each.name, each.class_name) for each in place_objects(load_world(own), 1)] == [("my_wrench", "wrench")]
+    assert lying(load_world(str(own)), 1) == {"my_wrench": ("wrench", "rack")}
     assert load_knowledge(own / "knowledge.yaml").usual_surfaces("wrench") == ("rack",)
 
 
@@ -188,6 +266,13 @@ def test_a_building_of_open_rmf_becomes_a_world_to_drive_in(tmp_path):
     out = ("--out", tmp_path / "out", "--no-record", "--quiet", "--json")
     ran = done("run", "--say", "go to the desk", "--world", tmp_path / "own", *out)
     assert json_of(ran)["referee"]["success"] and json_of(ran)["referee"]["collisions"] == 0
+
+
+def test_a_name_of_a_building_that_no_sentence_can_say_is_warned_of(tmp_path):
+    file = tmp_path / "own.building.yaml"
+    file.write_text(BUILDING.replace("desk", "please"))
+    built = done("world", "from-map", file, "--out", tmp_path / "own", "--no-dock", "--person", "", "--scale", 0.04)
+    assert "places.please: no sentence can say this name" in built.stderr
 
 
 def test_options_of_a_building_are_refused_for_another_map(map_file, tmp_path):

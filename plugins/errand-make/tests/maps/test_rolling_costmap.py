@@ -1,23 +1,25 @@
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from errand_make.maps.rolling_costmap import RollingCostmap, RollingCostmapOptions
-from executive.mission.load import load_stack, stack_file
+from executive.tree.registry import installed_skills
 from skills.api import Succeeded
-from skills.estimate.localiser import DeadReckoning
-from skills.navigate.skill import Navigate, NavigateInputs
-from skills.navigate.surroundings import NavigateOptions
+from skills.inputs.yaml_source import read_yaml
 from skills.robot import Pose2D
+from skills.stack import stack_of
 from tests.skills.planar_robot import TWO_ROOMS, Bench, Box
 
 START = Pose2D(1.5, 5.4, 0.0)
+NAVIGATE = installed_skills()["navigate"]
+ODOMETRY = stack_of({"localiser": {"use": "dead_reckoning"}}).localiser
 PERSON = Box(3.2, 5.2, 3.6, 5.6, 0.0, 1.7)
 
 
 def bench_of(*more, start=START, **options):
-    bench = Bench(start, surveyed=[*TWO_ROOMS, *more], component=DeadReckoning(), cameras=False)
+    bench = Bench(start, surveyed=[*TWO_ROOMS, *more], component=ODOMETRY, cameras=False)
     bench.costmap = RollingCostmap(RollingCostmapOptions(**options))
     return bench
 
@@ -96,7 +98,7 @@ def test_only_new_obstacles_count_as_unexplained():
 
 def test_robot_plans_around_a_new_obstacle_without_standing():
     bench, pillar = ticked(bench_of(start=Pose2D(2.2, 5.4, 0.0)), 10), Box(6.2, 5.3, 6.4, 5.6, 0.0, 1.7)
-    skill, speeds = Navigate(bench.context(), NavigateOptions(review_m=5.0)), []
+    skill, speeds = NAVIGATE(bench.context(), NAVIGATE.Options(review_m=5.0)), []
 
     def pillar_appears():
         x = bench.robot.pose.x_m
@@ -105,7 +107,7 @@ def test_robot_plans_around_a_new_obstacle_without_standing():
         if 3.2 < x < 6.5:
             speeds.append(float(bench.robot.velocity[0]))
 
-    step = bench.run(skill, NavigateInputs(Pose2D(7.6, 5.4, 0.0)), each=pillar_appears)
+    step = bench.run(skill, NAVIGATE.Inputs(Pose2D(7.6, 5.4, 0.0)), each=pillar_appears)
     assert isinstance(step, Succeeded), step.message
     assert bench.robot.least_clearance_m > 0.03
     assert min(speeds) > 0.1
@@ -113,4 +115,6 @@ def test_robot_plans_around_a_new_obstacle_without_standing():
 
 
 def test_the_stack_for_unknown_places_uses_it():
-    assert load_stack(stack_file(Path("no_map"))).names["costmap"] == "rolling"
+    (registered,) = entry_points(group="errand.stacks", name="no_map")
+    stack = stack_of(read_yaml(Path(registered.load().__file__).with_name("no_map_stack.yaml")).data)
+    assert stack.names["costmap"] == "rolling"

@@ -12,9 +12,8 @@ from skills.geometry import relative_pose
 from skills.grid_map import load_grid_map
 from skills.inputs.errors import InputError
 from skills.robot import Pose2D
-from skills.testing.blocks import grid_of
 from skills.testing.clock import VirtualClock
-from tests.skills.planar_robot import TWO_ROOMS, Box, PlanarRobot, capabilities_of
+from tests.skills.planar_robot import TWO_ROOMS, Box, PlanarRobot, capabilities_of, grids_of
 
 pytest.importorskip("gtsam")
 
@@ -67,7 +66,7 @@ def test_all_rooms_are_explored_without_a_touch_and_the_robot_comes_home(explore
     assert trip.robot.least_clearance_m > 0.0
     off = relative_pose(CORNER, trip.robot.pose)
     assert math.hypot(off.x_m, off.y_m) < 0.2
-    made, true = load_grid_map(folder / "keepout.yaml"), grid_of(SIDE_ROOM, (0.05, 1.0))
+    made, true = load_grid_map(folder / "keepout.yaml"), grids_of(SIDE_ROOM)[1]
     free = true.centres(np.argwhere(true.distance > 0.4))
     rows, columns = made.cells(free[(free > 0.0).all(axis=1) & (free < [6.0, 3.0]).all(axis=1)]).T
     assert np.mean(~(made.occupied | made.unknown)[rows, columns]) > 0.95
@@ -75,7 +74,7 @@ def test_all_rooms_are_explored_without_a_touch_and_the_robot_comes_home(explore
 
 def test_the_walls_of_the_map_are_those_of_the_truth(explored):
     _, folder = explored
-    made, true = load_grid_map(folder / "scan.yaml"), grid_of(SIDE_ROOM, (0.7, 1.3))
+    made, true = load_grid_map(folder / "scan.yaml"), grids_of(SIDE_ROOM)[0]
     walls = made.centres(np.argwhere(made.occupied))
     assert len(walls) > 500
     assert np.mean(true.distance_m(walls) < 0.05) > 0.95
@@ -191,7 +190,7 @@ def test_abandoned_frontiers_are_tried_again_from_home():
 
 def side_room_seen(trip):
     """The share of the side room's free ground that is free on the map."""
-    true, (made, _) = grid_of(SIDE_ROOM, (0.05, 1.0)), trip.survey.known_grid()
+    (_, true), (made, _) = grids_of(SIDE_ROOM), trip.survey.known_grid()
     free = true.centres(np.argwhere(true.distance > 0.3))
     free = free[(free > [3.4, 0.0]).all(axis=1) & (free < [6.0, 3.0]).all(axis=1)]
     rows, columns = made.cells(free).T

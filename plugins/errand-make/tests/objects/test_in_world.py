@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from errand_make.objects import ImportOptions, import_object
-from plant.simulation import Simulation
-from plant.worlds.seeding import place_objects
-from plant.worlds.world import WORLDS_FOLDER, load_world
+from executive import load_world
+from executive.app.prepare.placed_robots import only_robot
+from executive.app.runs.simulated import simulate
 
 trimesh = pytest.importorskip("trimesh")
 pytest.importorskip("coacd")
@@ -34,24 +34,26 @@ def world_folder(tmp_path):
     """The flat with one object, an imported one, and nobody in it."""
     import_tool(tmp_path)
     folder = tmp_path / "flat"
-    shutil.copytree(WORLDS_FOLDER / "flat", folder)
+    shutil.copytree(load_world("flat").folder, folder)
     rules = (folder / "objects.yaml").read_text().partition("objects:\n")[0]
     (folder / "objects.yaml").write_text(f"imports: [../my tool]\n{rules}{OBJECTS}")
     return folder
 
 
 def test_an_imported_object_settles_on_a_table(world_folder):
-    simulation = Simulation(load_world(world_folder), seed=1, visuals=False)
+    world = load_world(str(world_folder))
+    simulation = simulate(world, {"Alice": only_robot("Alice", world)}, seed=1, record=False)
     plant = simulation.engine.world.plant
     (index,) = plant.GetBodyIndices(plant.GetModelInstanceByName("my tool"))
-    body, (placed,) = plant.get_body(index), place_objects(simulation.world, 1)
+    body = plant.get_body(index)
+    placed = plant.EvalBodyPoseInWorld(simulation.engine.context, body)
     assert body.default_mass() == pytest.approx(0.5)
     simulation.clock.advance(0.5)
     early = plant.EvalBodyPoseInWorld(simulation.engine.context, body)
     simulation.clock.advance(1.0)
     late = plant.EvalBodyPoseInWorld(simulation.engine.context, body)
     np.testing.assert_allclose(late.translation(), early.translation(), atol=2e-4)
-    surface = simulation.world.surfaces["workbench"]
+    surface = world.surfaces["workbench"]
     assert late.translation()[2] == pytest.approx(surface.height_m + 0.014, abs=5e-4)
-    np.testing.assert_allclose(late.rotation().matrix(), placed.X_WO.rotation().matrix(), atol=2e-3)
+    np.testing.assert_allclose(late.rotation().matrix(), placed.rotation().matrix(), atol=2e-3)
     assert "my tool" in simulation.engine.asleep

@@ -9,8 +9,8 @@ from table_scene import GREEN, TABLE, Can
 from errand_make.objects import ImportOptions, ImportReports, import_photographs
 from errand_make.objects.photographs import cut_out
 from executive.app.report.artifacts import Artifacts, save_views
+from executive.tree.registry import installed_skills
 from plant.models.catalogue import read_imported
-from skills.detect.skill import Detect, DetectInputs
 from skills.inputs.errors import InputError
 from skills.perception.object_model import read_model
 from tests.tables import table
@@ -86,6 +86,14 @@ def test_too_few_or_too_many_photographs_are_refused(tmp_path, count):
         import_photographs(photographs, ImportOptions("mug"), tmp_path, ImportReports(), SIZE_M)
 
 
+def test_photographs_of_a_phone_are_refused_by_their_names(tmp_path):
+    for k in range(4):
+        (tmp_path / f"{k}.HEIC").write_bytes(b"\0\0\0\x1cftypheic" + bytes(64))
+    with pytest.raises(InputError, match=r"of 4 photographs 0 can be used") as caught:
+        import_photographs(tmp_path, ImportOptions("mug"), tmp_path, ImportReports(), SIZE_M)
+    assert "save it as JPEG: heif-convert 0.HEIC 0.jpg" in str(caught.value.others[0])
+
+
 def test_less_than_four_good_photographs_are_refused_with_the_bad_ones(tmp_path):
     photographs = series(tmp_path / "photographs", 5)
     for name in ("1.png", "2.png"):
@@ -98,7 +106,8 @@ def test_less_than_four_good_photographs_are_refused_with_the_bad_ones(tmp_path)
 def test_the_views_of_an_unexplained_object_are_photographs_of_it(tmp_path):
     log, artifacts, out, notes = [], Artifacts(), tmp_path / "tin", list[str]()
     robot = TableRobot(things=[Can(1.1, 0.2, 0.06, 0.2, GREEN)])
-    outcome(Detect(context_of(robot, log)), DetectInputs(("extinguisher",), (TABLE,)))
+    detect = installed_skills()["detect"]
+    outcome(detect(context_of(robot, log)), detect.Inputs(("extinguisher",), (TABLE,)))
     for topic, message in log:
         artifacts.message(topic, message)
     save_views(artifacts, tmp_path)

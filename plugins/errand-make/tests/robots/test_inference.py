@@ -10,9 +10,10 @@ import pytest
 from rover_urdf import box, joint, link
 
 from errand_make.robots.package import render_robot
-from plant.robots.urdf_robot.description import Description
+from plant.robots.urdf_robot.kind import urdf_kind
 from skills.inputs.errors import InputError
 from skills.inputs.yaml_source import read_yaml
+from skills.robot import Capabilities
 
 ARM = [f"arm_{k}_joint" for k in range(1, 7)]
 
@@ -22,7 +23,7 @@ class Made:
     """A rendered robot: the data of its file, its capabilities, and the points to check in one text."""
 
     data: dict
-    description: Description
+    can: Capabilities
     notes: str
 
 
@@ -35,7 +36,7 @@ def make(tmp_path):
         urdf.write_text(cart.robot(*parts))
         notes = render_robot("cart", urdf, tmp_path / "made", packages={})
         path = tmp_path / "made/errand_robot_cart/robot.yaml"
-        return Made(read_yaml(path).data, Description(path), "\n".join(notes))
+        return Made(read_yaml(path).data, urdf_kind(path).capabilities(), "\n".join(notes))
 
     return made
 
@@ -57,13 +58,23 @@ def test_a_joint_that_turns_very_far_is_a_wheel(make):
     assert made.data["base"]["motion"] == "differential" and made.data["base"]["height"] == pytest.approx(0.0)
 
 
+def test_wheels_of_type_revolute_without_limits_are_wheels(make):
+    made = make(cart.base(), (part.replace('"continuous"', '"revolute"') for part in cart.wheels()))
+    assert made.data["base"]["motion"] == "differential" and "2 wheels were found" in made.notes
+
+
+def test_wheels_on_the_rotors_of_their_motors_are_wheels(make):
+    made = make(cart.base(), cart.wheel("left_rotor", "0 0.22 0.1"), cart.wheel("right_rotor", "0 -0.22 0.1"))
+    assert made.data["base"]["motion"] == "differential"
+
+
 def test_wheels_about_x_turn_the_front_to_y(make):
     turned = {"axis": "1 0 0", "rpy": "0 1.5707963 0"}
     made = make(cart.base(), cart.wheel("left", "-0.22 0 0.1", **turned), cart.wheel("right", "0.22 0 0.1", **turned))
     assert "wheels turn about x, so the robot's front is y of base_link" in made.notes
     assert made.data["base"]["motion"] == "differential"
-    X_BL = made.description.assembly.X_BL["base_link"]
-    assert np.allclose(X_BL.rotation().inverse() @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], atol=1e-6)
+    (camera,) = made.can.cameras  # it stands 0.22 m along x of base_link, which is to the right of the robot
+    assert np.allclose(camera.X_FC.translation(), [0.0, -0.22, 0.9], atol=1e-6)
 
 
 def test_steered_wheels_are_named_as_those_of_a_car(make):
@@ -107,6 +118,99 @@ def test_an_arm_fixed_to_the_world_needs_a_base(make):
     with pytest.raises(InputError, match="nothing drives: no wheel turns and no leg stands on the floor") as refused:
         make(stand, cart.arm(height=0.2))
     assert "give a base" in refused.value.hint and refused.value.line
+
+
+def pivots(names, places, axis="0 0 1", kind="continuous"):
+    """Flat plates of 0.2 m that turn on the base."""
+    for name, place in zip(names, places, strict=True):
+        yield link(name, 0.05, box("0.2 0.02 0.005"), size=0.05)
+        yield joint(f"{name}_joint", kind, "base_link", name, place, axis=axis)
+
+
+CORNERS = ["0.3 0.3 0.3", "-0.3 0.3 0.3", "0.3 -0.3 0.3", "-0.3 -0.3 0.3"]
+PROPELLERS = ["propeller_1", "propeller_2"]
+#   parts beside a base without wheels                                                what is refused
+STANDING = [
+    (cart.arm(joints=3), "nothing drives"),
+    (cart.arm(joints=2), "nothing drives"),
+    (pivots(["m1", "m2", "m3", "m4"], CORNERS), "it flies or swims by m1, m2, m3 and m4"),
+    (pivots(PROPELLERS, CORNERS[:2], "1 0 0"), "it flies or swims by propeller_1 and propeller_2"),
+    ([*pivots(PROPELLERS, CORNERS[:2], kind="fixed"), *cart.arm()], "it flies or swims by propeller_1 and propeller_2"),
+]
+
+
+@pytest.mark.parametrize(("parts", "what"), STANDING, ids=["arm 3", "arm 2", "rotors", "thrusters", "fixed"])
+def test_a_machine_that_stands_flies_or_swims_is_refused_by_this_reason(make, parts, what):
+    with pytest.raises(InputError, match=what):
+        make(cart.base(), parts)
+
+
+def test_a_robot_named_quadrotor_flies(make):
+    body = [part.replace("laser", "quadrotor_shell.stl") for part in cart.base()]
+    with pytest.raises(InputError, match="it flies or swims by rotors"):
+        make(body)
+
+
+def test_a_base_without_wheels_and_its_head_are_a_guess(make):
+    made = make(cart.base(), cart.head())
+    assert made.data["head"] == ["pan_joint", "tilt_joint"] and "omnidirectional is a guess" in made.notes
+
+
+def test_motors_of_legs_are_no_rotors(make):
+    legs = [cart.leg(f"leg_{x}_{y}", x, y) for x in (0.2, -0.2) for y in (0.15, -0.15)]
+    made = make(cart.base(), *legs, pivots(["hip_rotor_1", "hip_rotor_2"], CORNERS[:2], kind="fixed"))
+    assert "4 legs were found" in made.notes
+
+
+def test_a_force_sensor_inside_an_arm_is_fixed_and_noted(make):
+    sensor = [link("cell", 0.1, box("0.02 0.05 0.05"))]
+    sensor += [joint("cell_joint", "revolute", "arm_6", "cell", "0.08 0 0", axis="1 0 0", limit=(0, 0, 1, 1))]
+    made = make(cart.base(), cart.wheels(), cart.arm(), sensor, cart.palm("cell"), cart.fingers())
+    assert made.data["arm"]["joints"] == ARM and "gripper" in made.data and "held" not in made.data
+    assert "joint cell_joint: lower and upper are both 0, so taken as fixed" in made.notes
+
+
+def test_load_cells_between_joints_do_not_cut_an_arm(make):
+    arm = [part.replace('parent link="arm_3"', 'parent link="cell"') for part in cart.arm()]
+    cell = [link("cell", 0.1, box("0.02 0.05 0.05"))]
+    cell += [joint("cell_slide", "prismatic", "arm_3", "cell", axis="1 0 0", limit=(-1e-6, 1e-6, 1, 1))]
+    assert make(cart.base(), cart.wheels(), arm, cell).data["arm"]["joints"] == ARM
+
+
+def test_a_file_whose_joints_all_have_limits_of_zero_is_refused(make):
+    arm = [part.replace('lower="-2.8" upper="2.8"', 'lower="0" upper="0"') for part in cart.arm()]
+    with pytest.raises(InputError, match=r"no joint moves: lower and upper of arm_1_joint, .* are both 0"):
+        make(cart.base(), arm)
+
+
+def hand(length):
+    """Two hinged fingers, each with a tip that mimics, behind an arm of four joints."""
+    for side in (1, -1):
+        for part, parent, place in (("knuckle", "arm_4", f"{length} {0.03 * side} 0"), ("tip", "knuckle", "0.05 0 0")):
+            name = f"{part}_{side}"
+            above = parent if part == "knuckle" else f"{parent}_{side}"
+            mimic = f'<mimic joint="knuckle_{side}_joint"/></joint>' if part == "tip" else "</joint>"
+            yield link(name, 0.05, box("0.05 0.01 0.02"), "0.025 0 0", size=0.03)
+            text = joint(f"{name}_joint", "revolute", above, name, place, axis="0 0 1", limit=(-1, 1, 5, 1))
+            yield text.replace("</joint>", mimic)
+
+
+def test_a_hand_may_be_as_long_as_its_arm(make):
+    made = make(cart.base(), cart.wheels(), cart.arm(joints=4), hand(0.5))
+    assert made.data["arm"]["joints"] == ARM[:4]
+
+
+#   parts beside base and wheels                       why there is no arm
+NO_ARM = [
+    (cart.arm(joints=3), "arm_1_joint, arm_2_joint and arm_3_joint have 3 joints in a row that turn"),
+    ([*cart.arm(joints=4), *hand(1.5)], "too large for the hand of arm_1_joint, arm_2_joint"),
+]
+
+
+@pytest.mark.parametrize(("parts", "why"), NO_ARM, ids=["three", "hand"])
+def test_a_line_says_why_a_chain_is_no_arm(make, parts, why):
+    notes = make(cart.base(), cart.wheels(), parts).notes
+    assert "no arm is taken" in notes and why in notes
 
 
 def test_joints_that_move_the_whole_robot_over_the_floor_are_its_drive(make):
@@ -197,7 +301,7 @@ def test_a_lift_is_held_with_its_shoulder_at_a_counter_and_the_line_that_drives_
 
 def test_a_head_whose_tilt_turns_about_minus_y_is_turned_round(make):
     made = make(cart.base(), cart.wheels(), cart.head("0 -1 0", (-1.2, 0.5)))
-    can = made.description.capabilities
+    can = made.can
     assert can.head is not None and can.head.tilt_range_rad == pytest.approx((-0.5, 1.2))
     assert "the axis of tilt_joint is turned round" in made.notes
 
@@ -236,9 +340,13 @@ def test_a_marker_for_a_camera_is_no_camera(make):
 def test_a_lidar_is_added_where_no_link_looks_like_one(make):
     bare = [part.replace("laser", "bumper") for part in cart.base()]
     made = make(bare, cart.wheels())
-    assert made.data["lidar"][
-        "link"
-    ] == "errand_lidar" and made.description.capabilities.lidar_height_m == pytest.approx(0.25)
+    assert made.data["lidar"]["link"] == "errand_lidar" and made.can.lidar_height_m == pytest.approx(0.25)
+
+
+def test_a_sonar_that_is_simulated_by_rays_is_no_lidar(make):
+    bare = [part.replace("laser", "sonar_0") for part in cart.base()]
+    made = make(bare, cart.wheels(), '<gazebo reference="sonar_0"><sensor type="ray" name="range"/></gazebo>')
+    assert made.data["lidar"]["link"] == "errand_lidar"
 
 
 def test_thousands_of_links_take_seconds(make):

@@ -8,7 +8,7 @@ import pytest
 from rover_urdf import write_package
 
 from errand_make.robots.package import render_robot
-from plant.robots.urdf_robot.description import Description
+from plant.robots.urdf_robot.kind import urdf_kind
 from skills.inputs.errors import InputError
 from skills.inputs.yaml_source import read_yaml
 from skills.robot import Mount
@@ -58,7 +58,7 @@ def test_the_file_marks_the_parts_that_a_urdf_does_not_decide(rover_package):
 
 def test_joints_of_pan_and_tilt_are_a_head_that_carries_the_camera(tmp_path):
     render_robot("rover", write_package(tmp_path, with_head=True), tmp_path / "made", packages={})
-    can = Description(tmp_path / "made/errand_robot_rover/robot.yaml").capabilities
+    can = urdf_kind(tmp_path / "made/errand_robot_rover/robot.yaml").capabilities()
     assert can.head is not None and can.head.joint_names == ("head_pan", "head_tilt")
     assert np.allclose(can.head.p_BP_m, [-0.10, 0.0, 1.12]) and can.object_camera.mount is Mount.HEAD
 
@@ -66,7 +66,7 @@ def test_joints_of_pan_and_tilt_are_a_head_that_carries_the_camera(tmp_path):
 @pytest.mark.parametrize("options", [{"with_gripper": False}, {"with_arm": False}])
 def test_a_robot_may_have_no_gripper_or_no_arm(tmp_path, options):
     render_robot("rover", write_package(tmp_path, **options), tmp_path / "made", packages={})
-    can = Description(tmp_path / "made/errand_robot_rover/robot.yaml").capabilities
+    can = urdf_kind(tmp_path / "made/errand_robot_rover/robot.yaml").capabilities()
     assert can.gripper is None and (can.arm is None) == ("with_arm" in options)
     assert not (tmp_path / "made/tests/grasp.skilltest.yaml").exists()
 

@@ -10,7 +10,7 @@ import public_robots
 import pytest
 
 from errand_make.robots.package import render_robot
-from plant.robots.urdf_robot.description import Description
+from plant.robots.urdf_robot.kind import urdf_kind
 from skills.inputs.yaml_source import read_yaml
 
 KINDS = {"published_fetch": public_robots.fetch, "published_waffle": public_robots.waffle}
@@ -60,7 +60,7 @@ def test_the_waffle_is_read_with_its_wheels_lidar_and_camera(packages):
     path = folder / "published_waffle/errand_robot_published_waffle/robot.yaml"
     data = read_yaml(path).data
     assert data["base"]["motion"] == "differential" and data["lidar"]["link"] == "base_scan" and "arm" not in data
-    size_m = np.ptp(np.array(Description(path).capabilities.footprint_m), axis=0)
+    size_m = np.ptp(np.array(urdf_kind(path).capabilities().footprint_m), axis=0)
     assert size_m == pytest.approx([0.272, 0.306], abs=0.005)
 
 

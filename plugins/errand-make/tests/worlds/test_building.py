@@ -9,8 +9,8 @@ import yaml
 from errand_make.worlds.building import building_grid, building_plan, building_start, is_building, read_building
 from errand_make.worlds.own import world_from_grid
 from errand_make.worlds.rooms import FREE, OCCUPIED, UNKNOWN
+from executive import load_world
 from executive.words.knowledge import load_knowledge
-from plant.worlds.world import load_world
 from skills.inputs.errors import InputError
 from skills.inputs.yaml_source import parse_yaml
 
@@ -48,7 +48,7 @@ def made(folder, data):
     grid, notes = building_grid(plan), []
     start = building_start(plan, grid)
     world_from_grid(folder, grid, start=start, wall_height_m=2.5, plan=building_plan(plan, notes.append))
-    return load_world(folder), load_knowledge(folder / "knowledge.yaml"), notes
+    return load_world(str(folder)), load_knowledge(folder / "knowledge.yaml"), notes
 
 
 def test_rooms_doors_names_and_lanes_come_from_the_building(tmp_path):
@@ -126,6 +126,62 @@ def test_the_second_vertex_of_a_name_is_left_out_with_both_lines():
 def test_metres_need_no_measurement_and_keep_their_signs():
     data = {**building(measurements=[]), "coordinate_system": "cartesian_meters"}
     assert read(data).names["desk"] == (340.0, 120.0)
+
+
+def storeys(fiducials, **changes):
+    """A second level beside the building's first, whose fiducials a and b are at (0, 0) and (8, 0) m."""
+    upper = {**building(measurements=[])["levels"]["L1"], "fiducials": fiducials}
+    lower = {**building()["levels"]["L1"], "fiducials": [[0, 0, "a"], [400, 0, "b"]]}
+    return {**building(), "levels": {"L1": lower, "L2": upper}, **changes}
+
+
+#   fiducials of the upper level                          where its vertex (340, 120) lies
+FRAMES = [
+    ([[0, 0, "a"], [400, 0, "b"]], (6.8, -2.4)),
+    ([[100, 20, "a"], [300, 20, "b"]], (9.6, -4.0)),
+    ([[40, 20, "b"], [40, 420, "a"], [7, 7, "c"]], (6.0, -6.0)),
+    ([[0, 0, "a"], [0, 400, "b"]], (2.4, 6.8)),
+]
+
+
+@pytest.mark.parametrize(("fiducials", "desk"), FRAMES)
+def test_a_level_is_turned_scaled_and_moved_to_the_fiducials_of_the_reference_level(fiducials, desk):
+    plan = read(storeys(fiducials), level="L2")
+    assert plan.names["desk"] == pytest.approx(desk) and not any("scale" in note for note in plan.notes)
+
+
+def test_another_level_may_be_the_reference_level():
+    data = storeys([[0, 0, "a"], [0, 400, "b"]], reference_level_name="L2")
+    data["levels"]["L2"]["measurements"] = [[0, 1, {"distance": [3, 8.0]}]]
+    assert read(data, level="L1").names["desk"] == pytest.approx((-4.8, -13.6))
+
+
+def test_the_scale_of_an_upper_level_may_be_given():
+    assert read(storeys([[100, 20, "a"], [300, 20, "b"]]), level="L2", scale_m=0.1).names["desk"] == pytest.approx(
+        (24.0, -10.0)
+    )
+
+
+def test_a_level_with_one_common_fiducial_keeps_the_frame_of_its_drawing():
+    plan = read(storeys([[100, 20, "a"], [300, 20, "z"]]), level="L2", scale_m=0.02)
+    assert plan.names["desk"] == pytest.approx((6.8, -2.4))
+    assert any("has 1 fiducials in common with the reference level L1, and needs 2" in note for note in plan.notes)
+
+
+#   fiducials of the upper level, changes                             a part of the message
+FIDUCIALS = [
+    (([[0, 0, "a"], [0, 0, "b"]], {}), "two fiducials of level L2 or L1 are at one point"),
+    (([[0, 0], [1, 0, "b"]], {}), r"fiducial 0 is not \[x, y, name\]"),
+    (([[0, float("nan"), "a"], [1, 0, "b"]], {}), "fiducial 0 is not"),
+    (([], {"reference_level_name": "L9"}), "there is no level 'L9' for the reference"),
+]
+
+
+@pytest.mark.parametrize(("given", "message"), FIDUCIALS, ids=[message[:20] for _, message in FIDUCIALS])
+def test_wrong_fiducials_are_refused(given, message):
+    fiducials, changes = given
+    with pytest.raises(InputError, match=message):
+        read(storeys(fiducials, **changes), level="L2")
 
 
 def test_the_scale_may_be_given():

@@ -6,8 +6,9 @@ import yaml
 
 from errand_make.worlds.own import rectangles, world_from_cylinders, world_from_grid
 from errand_make.worlds.rooms import FREE, OCCUPIED, UNKNOWN, Grid
-from plant.diagram import DiagramConfig, build_diagram
-from plant.worlds.world import WorldError, load_world
+from executive import load_world
+from executive.app.runs.simulated import simulate
+from plant.worlds.world import WorldError
 from skills.robot import Pose2D
 
 
@@ -42,11 +43,11 @@ def test_rooms_and_the_door_between_them_are_found(tmp_path, resolution_m):
 
 def test_the_walls_stand_where_the_map_has_them(tmp_path):
     world_from_grid(tmp_path, two_rooms(), start=Pose2D(2.0, 0.0, 0.0), wall_height_m=2.5)
-    world = load_world(tmp_path)
+    world = load_world(str(tmp_path))
     assert world.start == Pose2D(2.0, 0.0, 0.0)
-    built = build_diagram(DiagramConfig(directives=world.directives_path, render=False))
-    scene = built.scene_graph.GetMyContextFromRoot(built.diagram.CreateDefaultContext())
-    query = built.scene_graph.get_query_output_port().Eval(scene)
+    simulation = simulate(world, {}, seed=1, record=True)
+    simulation.clock.advance(0.1)
+    query = simulation.query_at(0.1)
 
     def near_m(*p_W):
         return min(each.distance for each in query.ComputeSignedDistanceToPoint(p_W))

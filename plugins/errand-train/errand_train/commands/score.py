@@ -23,7 +23,7 @@ from executive.app.report.pictures import open_detector, read_picture, write_pic
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for, print_json
 from skills.api import Detection, Detector
-from skills.inputs.errors import InputError
+from skills.inputs.errors import InputError, count_text
 from skills.inputs.outside import read_text
 from skills.perception.detector.augmentation import AugmentedDetector
 from skills.perception.detector.camera_images import rotate_180, rotate_boxes_180
@@ -38,6 +38,7 @@ USUAL_SCORE: Final = 0.5
 TIMED_PICTURES: Final = 200
 TOGETHER: Final = 8
 WORST: Final = 20
+_SHOWN: Final = 3
 MOST_BYTES: Final = 2_000_000_000
 
 Found = tuple[Detection, ...]
@@ -85,6 +86,7 @@ def score_command(
     named = [{"file": work.pictures[k].file, "error": round(_error(work, found, k), 3)} for k in order]
     if as_json:
         read = {"aliases": dict(work.data.aliases), "left_out": dict(work.data.left_out)}
+        read |= {"outside": list(work.data.outside)} if work.data.outside else {}
         print_json({"data": str(data), **scores_json(scores, speed), **read, **({"worst": named} if named else {})})
     else:
         _show_categories(console, work.data)
@@ -94,12 +96,16 @@ def score_command(
 
 
 def _show_categories(console: Console, data: LabelledPictures) -> None:
-    """Prints which categories are read as another class, and which are left out."""
+    """Prints which categories are read as another class, and which categories and labels are left out."""
     for name, ours in data.aliases.items():
         console.print(f"category '{name}' is read as {ours}", markup=False)
     for name, count in data.left_out.items():
         labels = "1 label" if count == 1 else f"{count} labels"
         console.print(f"category '{name}' is left out, with {labels}: the detector has no such class", markup=False)
+    if outside := data.outside:
+        shown = ", ".join(f"annotations[{k}]" for k in outside[:_SHOWN]) + ", ..." * (len(outside) > _SHOWN)
+        what = f"{count_text(len(outside), 'label')} without an area in the picture left out: {shown}"
+        console.print(what, markup=False, soft_wrap=True)
 
 
 def _work(data: Path, folder: Path, limit: int | None, detectors: tuple[Detector, Detector], views: bool) -> _Work:
@@ -111,7 +117,8 @@ def _work(data: Path, folder: Path, limit: int | None, detectors: tuple[Detector
         document = pictures_of_coco(_document(data), detector.class_names)
         labelled = document.pictures[:limit]
     except ValueError as error:
-        raise InputError(str(error), hint="name a COCO file with --data", file=data) from error
+        hint = "correct it, or name another COCO file with --data"
+        raise InputError(str(error), hint=hint, file=data) from error
     files = tuple(folder / picture.file for picture in labelled)
     missing = [file for file in files if not file.is_file()]
     if missing:

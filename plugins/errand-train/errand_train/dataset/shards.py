@@ -157,7 +157,7 @@ def _others_entry(others: Sequence[Path]) -> dict[str, str]:
 def _compare(path: Path, wanted: Mapping[str, Any]) -> None:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:
         raise DatasetError(f"{path}: is damaged ({error})", "remove the folder, or name another with --out") from error
     if not isinstance(found, dict):
         raise DatasetError(f"{path}: is damaged", "remove the folder, or name another with --out")
@@ -240,7 +240,7 @@ def _shots(out: Path, images: int) -> Iterator[Mapping[str, Any]]:
         path = _scene_folder(out, index) / _SHOTS
         try:
             entries = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, json.JSONDecodeError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             hint = f"remove {path.parent}; the same command makes it again"
             raise DatasetError(f"{path}: is damaged or missing", hint) from error
         yield from entries[:count]

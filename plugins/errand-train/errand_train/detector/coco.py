@@ -6,15 +6,20 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
+Id = Annotated[
+    int | str, AfterValidator(lambda name: int(name) if isinstance(name, str) and name.isdecimal() else name)
+]
+"""A number, also when the file writes it as text, or another text."""
+
 
 class _Entry(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="ignore")
+    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
 
 
 class CocoImage(_Entry):
     """A picture; `crowded` ones are of scenes with more objects than usual. Backslashes in its name become slashes."""
 
-    id: int | str
+    id: Id
     file_name: Annotated[str, AfterValidator(lambda name: name.replace("\\", "/"))]
     width: int | None = None
     height: int | None = None
@@ -35,8 +40,8 @@ class CocoLabel(_Entry):
     beyond the picture's edge.
     """
 
-    image_id: int | str
-    category_id: int | str
+    image_id: Id
+    category_id: Id
     bbox: tuple[float, float, float, float]
     segmentation: Any = None
     iscrowd: bool = False
@@ -44,6 +49,12 @@ class CocoLabel(_Entry):
     visibility: float | None = None
     truncation: float | None = None
     distance_m: float | None = None
+
+    def is_in(self, size_px: tuple[int, int] | None) -> bool:
+        """True when the box has an area in a picture of this size, if that is known."""
+        x, y, width, height = self.bbox
+        right, bottom = (x + width, y + height) if size_px is None else size_px
+        return width > 0 and height > 0 and x < right and y < bottom and x + width > 0 and y + height > 0
 
     @property
     def seen(self) -> float | None:
@@ -56,7 +67,7 @@ class CocoLabel(_Entry):
 class CocoCategory(_Entry):
     """A class."""
 
-    id: int | str
+    id: Id
     name: str
 
 
@@ -76,6 +87,24 @@ class CocoFile(_Entry):
             labels[label.image_id].append(label)
         return [(image, labels[image.id]) for image in self.images]
 
+    def refuse_doubles(self) -> None:
+        """Raises ValueError when pictures or categories have one id, or pictures one file, as in files put together."""
+        lists = {
+            "images": [(image.id, image.file_name) for image in self.images],
+            "categories": [(category.id, category.name) for category in self.categories],
+        }
+        for what, pairs in lists.items():
+            first = dict[int | str, int]()
+            for k, (key, name) in enumerate(pairs):
+                other = first.setdefault(key, k)
+                if other != k and (what == "images" or pairs[other][1] != name):
+                    both = f"{key!r} ({name}) is also the id of {what}[{other}] ({pairs[other][1]})"
+                    raise ValueError(f"{what}[{k}].id: {both}")
+        files = dict[str, int]()
+        for k, image in enumerate(self.images):
+            if (other := files.setdefault(image.file_name, k)) != k:
+                raise ValueError(f"images[{k}].file_name: {image.file_name} is also the file of images[{other}]")
+
     def refuse_other_boxes(self) -> None:
         """Raises ValueError when the boxes are shares of the pictures' sides, or corners, instead of COCO's pixels."""
         wanted = "COCO's are x, y, width and height in pixels"
@@ -90,12 +119,14 @@ class CocoFile(_Entry):
 
 
 def coco_file(document: object) -> CocoFile:
-    """Validates a COCO file of a JSON value. Raises ValueError with the first wrong entry."""
+    """Validates a COCO file of a JSON value. Raises ValueError with the first wrong entry, or one id given twice."""
     try:
-        return CocoFile.model_validate(document)
+        file = CocoFile.model_validate(document)
     except ValidationError as error:
         first = error.errors()[0]
         place = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in first["loc"])
         raise ValueError(
             f"{place.removeprefix('.') or 'the file'}: {first['msg']}, not {first['input']!r:.60}"
         ) from error
+    file.refuse_doubles()
+    return file

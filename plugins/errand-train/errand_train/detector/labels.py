@@ -79,7 +79,7 @@ def _file(folder: Path, split: str) -> CocoFile:
         return coco_file(json.loads(path.read_text(encoding="utf-8")))
     except OSError as error:
         raise TrainingDataError(f"{path}: there is no such data set ({error.strerror})", hint=hint) from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise TrainingDataError(f"{path}: is damaged ({error})", hint=hint) from error
 
 

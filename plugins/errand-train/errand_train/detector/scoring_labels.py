@@ -88,18 +88,22 @@ def large_enough(box: Box) -> bool:
 
 @dataclass(frozen=True)
 class LabelledPictures:
-    """Pictures of a COCO file, the categories that are read as another class, and the labels left out by category."""
+    """Pictures of a COCO file, the categories that are read as another class, and the labels left out by category.
+
+    `outside`: the numbers of the labels that are left out since their boxes have no area in their pictures.
+    """
 
     pictures: tuple[LabelledPicture, ...]
     aliases: Mapping[str, str]
     left_out: Mapping[str, int]
+    outside: tuple[int, ...] = ()
 
 
 def pictures_of_coco(document: object, class_names: Sequence[str]) -> LabelledPictures:
     """Reads the pictures of a COCO file in the order of their ids, with the labels of the named classes.
 
     Categories match by name or by a synonym of one class, in upper or lower case; their ids may be any. Leaves out
-    labels of other categories. Raises ValueError, naming the entry.
+    labels of other categories, and those without an area in their picture. Raises ValueError, naming the entry.
     """
     coco = coco_file(document)
     coco.refuse_other_boxes()
@@ -114,10 +118,16 @@ def pictures_of_coco(document: object, class_names: Sequence[str]) -> LabelledPi
     counts = Counter(label.category_id for label in coco.annotations)
     others = {one.id: (one.name, names[one.id]) for one in coco.categories}
     pictures = sorted(coco.by_picture(), key=lambda pair: (isinstance(pair[0].id, str), pair[0].id))
+    sizes = {image.id: image.size_px for image in coco.images}
+    outside = tuple(k for k, one in enumerate(coco.annotations) if not one.is_in(sizes.get(one.image_id)))
     found = tuple(
         LabelledPicture(
             file=image.file_name,
-            labels=tuple(_label(one, name) for one in labels if (name := names[one.category_id]) is not None),
+            labels=tuple(
+                _label(one, name)
+                for one in labels
+                if (name := names[one.category_id]) is not None and one.is_in(image.size_px)
+            ),
             size_px=image.size_px,
             is_upside_down=abs(image.roll_deg) > LEAST_ROLL_DEG,
             camera=image.camera,
@@ -133,6 +143,7 @@ def pictures_of_coco(document: object, class_names: Sequence[str]) -> LabelledPi
             if ours is not None and ours.casefold() != name.strip().casefold()
         },
         {name: counts[number] for number, (name, ours) in others.items() if ours is None},
+        outside,
     )
 
 

@@ -39,7 +39,7 @@ def examination(folder: Path, split: str, class_names: Sequence[str], most: int 
     file = folder / f"{split}.json"
     try:
         found = pictures_of_coco(json.loads(file.read_text(encoding="utf-8")), class_names).pictures
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise TrainingDataError(f"{file}: cannot be used ({error})", hint="render the data set again") from error
     pictures = [one for one in found if not one.crowded]
     step = 1 if most is None else max(1, len(pictures) // most)

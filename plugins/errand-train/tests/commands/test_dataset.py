@@ -5,13 +5,12 @@ from typing import Any
 
 import cv2
 import pytest
-from typer.testing import CliRunner
 
-from executive.cli.entry import app
+from tests.executive.cli.calls import errand
 
 
-def errand(*arguments):
-    return CliRunner().invoke(app, ["dataset", "render", *arguments])
+def render(*arguments):
+    return errand("dataset", "render", *arguments)
 
 
 @pytest.mark.parametrize(
@@ -25,21 +24,21 @@ def errand(*arguments):
     ],
 )
 def test_wrong_arguments_are_refused(arguments, told):
-    result = errand(*arguments)
+    result = render(*arguments)
     assert result.exit_code == 2
     assert told in result.stderr
 
 
 def test_a_folder_that_is_not_ours_ends_with_status_2(tmp_path):
     (tmp_path / "thesis.tex").write_text("mine")
-    result = errand("--out", str(tmp_path), "--images", "8")
+    result = render("--out", str(tmp_path), "--images", "8")
     assert result.exit_code == 2
     assert "name a new or empty folder with --out" in " ".join(result.stderr.split())
 
 
 def rendered(folder):
     """What is told of four pictures that are made in a folder."""
-    result = errand("--out", str(folder), "--images", "4", "--seed", "3", "--jobs", "1", "--json")
+    result = render("--out", str(folder), "--images", "4", "--seed", "3", "--jobs", "1", "--json")
     assert result.exit_code == 0, result.stderr
     told = json.loads(result.stdout.splitlines()[-1])
     assert told["images"] == {"train": 4, "val": 0}

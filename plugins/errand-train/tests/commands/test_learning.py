@@ -1,8 +1,7 @@
 import pytest
-from typer.testing import CliRunner
 
 from errand_train import libraries
-from executive.cli.entry import app
+from tests.executive.cli.calls import errand
 
 
 @pytest.fixture(params=["train", "refine"])
@@ -12,7 +11,7 @@ def command(request):
 
 
 def run(*words):
-    return CliRunner().invoke(app, ["dataset", *words])
+    return errand("dataset", *words)
 
 
 def test_without_torch_the_extra_is_named(command, data, tmp_path, monkeypatch):

@@ -6,10 +6,8 @@ import json
 import cv2
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from executive.cli.entry import app
-from skills.perception.detector.augmentation import AugmentedDetector
+from tests.executive.cli.calls import errand
 from tests.skills.tiny_detector import picture_of, write_model
 
 HAMMER, BEER, STRAY = (
@@ -27,8 +25,7 @@ def model(tmp_path_factory):
 @pytest.fixture
 def score(model):
     def invoked(*arguments):
-        words = ["dataset", "score", "--model", str(model), *(str(one) for one in arguments)]
-        return CliRunner().invoke(app, words)
+        return errand("dataset", "score", "--model", model, *arguments)
 
     return invoked
 
@@ -94,6 +91,13 @@ def test_all_figures_are_reported(score, data):
     assert figures["by_size_px"][-1]["to"] is None
 
 
+def test_labels_without_an_area_are_named(score, data):
+    document = json.loads(data.read_text())
+    written(data, {**document, "annotations": [*document["annotations"], label(10, 3, (9, 9, 9, 40))]})
+    assert told(score("--data", data, "--json"))["outside"] == [5]
+    assert "1 label without an area in the picture left out: annotations[5]" in score("--data", data).stdout
+
+
 def test_without_pycocotools_the_command_says_what_to_install(score, data, monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     result = score("--data", data)
@@ -129,8 +133,18 @@ def test_a_plain_coco_file_has_no_figures_by_distance(score, data):
     assert figures["recall"] == pytest.approx(3 / 4)
 
 
+class NothingInViews:
+    """Test-time augmentation that sees nothing."""
+
+    def __init__(self, networks):
+        self.class_names = networks.class_names
+
+    def detect_in_views(self, picture):
+        return ()
+
+
 def test_test_time_augmentation_is_judged_when_asked_for(score, data, monkeypatch):
-    monkeypatch.setattr(AugmentedDetector, "detect_in_views", lambda self, picture: ())
+    monkeypatch.setattr("errand_train.commands.score.AugmentedDetector", NothingInViews)
     assert told(score("--data", data, "--views", "--json"))["recall"] == 0.0
     assert told(score("--data", data, "--json"))["recall"] == pytest.approx(3 / 4)
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from pydrake.geometry import RenderEngineVtkParams
 from pydrake.math import RigidTransform
 
 from errand_make.mesh import Material, Mesh
@@ -12,7 +13,7 @@ from errand_train.dataset.render import Stage, label_view
 from errand_train.dataset.room import Room
 from errand_train.dataset.silhouette import silhouette
 from errand_train.dataset.views import View, roll_deg
-from plant.rendering import render_parameters
+from plant.rendering import lights
 from plant.scene_pictures import look_at
 from skills.robot import Intrinsics
 
@@ -35,7 +36,7 @@ def empty_room():
 
 def labels_of(objects, folder):
     scene = Scene(empty_room(), objects, None, ())
-    stage = Stage(scene, Lighting("plain", render_parameters()), folder, 1.0)
+    stage = Stage(scene, Lighting("plain", RenderEngineVtkParams(lights=lights())), folder, 1.0)
     view = View("hand", look_at(EYE, (0, 0, 0.05)), CAMERA, False, False)
     clean, labels = stage.take(view)
     return label_view(stage.labelled, labels, view, stage.hand_pose(view), clean)

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 from pydrake.geometry import Box
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
@@ -21,7 +22,6 @@ from errand_train.dataset.resting import choose_pose, resting_poses
 from errand_train.dataset.room import random_room
 from errand_train.dataset.textures import ROLES, numbers, texture
 from errand_train.dataset.views import any_view, camera_specs
-from plant.worlds.seeding import polygon_distance
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -141,7 +141,7 @@ def test_a_validation_scene_has_only_held_out_instances_without_overlap(few_mode
     for k, (low, points, name) in enumerate(outlines):
         for other_low, other_points, other in outlines[:k]:
             if abs(low - other_low) < 0.2:
-                assert polygon_distance(points, other_points) > 0.0, (name, other)
+                assert shapely.Polygon(points).distance(shapely.Polygon(other_points)) > 0.0, (name, other)
 
 
 def thing_outline(thing):

@@ -22,10 +22,10 @@ from errand_train.detector.quantisation import quantise  # noqa: E402
 from skills.perception.detector.boxes import Scales, halve  # noqa: E402
 from skills.perception.detector.model_files import (  # noqa: E402
     CLASSIFIER,
+    CROP_PX,
     load_model,
     load_network,
 )
-from skills.perception.detector.onnx_detector import CROP_PX  # noqa: E402
 
 onnx = pytest.importorskip("onnx")
 CPU, NAMES = torch.device("cpu"), ("beer", "coke", "cube")

@@ -21,8 +21,8 @@ from errand_train.detector.loop import CHECKPOINT  # noqa: E402
 from errand_train.detector.refine import TABLE, refine  # noqa: E402
 from errand_train.detector.schedule import Budget, RefineOptions, Report, Schedule  # noqa: E402
 from errand_train.detector.train import MODEL  # noqa: E402
+from executive.app.report.pictures import open_detector  # noqa: E402
 from skills.perception.detector.model_files import classifier_file, load_model, refinement_file  # noqa: E402
-from skills.perception.detector.onnx_detector import OnnxDetector  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("small_networks")
 
@@ -85,7 +85,7 @@ def test_a_proposal_network_gets_a_refinement_network(once):
     assert refinement_file(options.out / MODEL).is_file()
     model = load_model(options.out / MODEL)
     assert model.refinement is not None
-    assert len(OnnxDetector(model).detect([picture_of()])) == 1
+    assert len(open_detector(options.out / MODEL, 0.5).detect([picture_of()])) == 1
     assert told[-1].progress == 1.0
     assert told[-1].figures is not None
     assert {path.name for path in options.out.iterdir()} >= {CHECKPOINT, MODEL, TABLE, "training.jsonl"}
@@ -99,7 +99,7 @@ def test_both_get_a_classifier_network_that_belongs_to_them(finished, tmp_path):
     assert model.refinement is not None
     assert model.classifier is not None
     assert model.classifier.metadata["second"] == model.refinement.digest
-    assert len(OnnxDetector(model).detect([picture_of()])) == 1
+    assert len(open_detector(next_one.out / MODEL, 0.5).detect([picture_of()])) == 1
 
 
 def test_without_a_refinement_network_there_is_no_classifier_network(options):

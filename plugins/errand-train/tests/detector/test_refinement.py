@@ -23,8 +23,7 @@ from errand_train.detector.proposal_table import ProposalTable, build_table, fir
 from errand_train.detector.refinement_network import RefinementNetwork, best_cell_about  # noqa: E402
 from errand_train.detector.store import PictureStore  # noqa: E402
 from skills.perception.detector.boxes import Scales, halve  # noqa: E402
-from skills.perception.detector.model_files import load_model, refinement_file  # noqa: E402
-from skills.perception.detector.onnx_detector import CROP_PX  # noqa: E402
+from skills.perception.detector.model_files import CROP_PX, load_model, refinement_file  # noqa: E402
 
 CPU = torch.device("cpu")
 THING, FAR = (100, 100, 200, 200), (300, 300, 400, 400)

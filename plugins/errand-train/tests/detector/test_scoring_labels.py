@@ -89,6 +89,75 @@ def test_anything_but_a_coco_file_is_refused_with_the_wrong_entry(changes, place
         pictures_of_coco(coco(**changes), CLASSES)
 
 
+FILES = [{"id": 7, "file_name": "b.jpg"}, {"id": 3, "file_name": "a.jpg"}]
+CATS = [{"id": 90, "name": "hammer"}, {"id": 4, "name": "person"}]
+
+
+@pytest.mark.parametrize(
+    ("changes", "what"),
+    [
+        ({"categories": [*CATS, {"id": 90, "name": "coke"}]}, r"categories\[2\].id: 90 \(coke\) is also the id of cat"),
+        (
+            {"categories": [*CATS, {"id": "90", "name": "coke"}]},
+            r"categories\[2\].id: 90 \(coke\) is also the id of cat",
+        ),
+        (
+            {"images": [*FILES, {"id": 3, "file_name": "c.jpg"}]},
+            r"images\[2\].id: 3 \(c.jpg\) is also the id of images\[1",
+        ),
+        (
+            {"images": [*FILES, {"id": 3, "file_name": "a.jpg"}]},
+            r"images\[2\].id: 3 \(a.jpg\) is also the id of images\[1",
+        ),
+        ({"images": [*FILES, {"id": 9, "file_name": "a.jpg"}]}, r"images\[2\].file_name: a.jpg is also the file of"),
+    ],
+)
+def test_a_label_that_is_there_twice_is_refused_with_both_places(changes, what):
+    with pytest.raises(ValueError, match=what):
+        pictures_of_coco(coco(**changes), CLASSES)
+
+
+def test_a_category_that_is_listed_twice_alike_is_one():
+    assert len(pictures_of_coco(coco(categories=[*coco()["categories"], *CATS[1:]]), CLASSES).pictures[1].labels) == 2
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
+@pytest.mark.parametrize("side", range(4))
+def test_a_box_with_a_value_that_is_no_number_is_refused(value, side):
+    box = [10, 20, 30, 40]
+    box[side] = value
+    with pytest.raises(ValueError, match=rf"annotations\[0\]\.bbox\[{side}\]: .*{value}"):
+        pictures_of_coco(coco(annotations=[{"image_id": 7, "category_id": 90, "bbox": box}]), CLASSES)
+
+
+@pytest.mark.parametrize(
+    "box", [[1, 2, 0, 4], [1, 2, 3, -4], [64, 2, 3, 4], [1, 48, 3, 4], [-9, 2, 9, 4], [1, -9, 3, 8]]
+)
+def test_labels_without_an_area_in_their_picture_are_left_out_and_named(box):
+    entries = [{"image_id": 7, "category_id": 90, "bbox": each} for each in ([10, 20, 30, 20], box)]
+    found = pictures_of_coco(coco(annotations=entries), CLASSES)
+    assert (len(found.pictures[1].labels), found.outside) == (1, (1,))
+
+
+def test_a_box_at_the_edge_counts_and_so_does_any_in_a_picture_of_unknown_size():
+    entries = [
+        {"image_id": 7, "category_id": 90, "bbox": [-5, -5, 10, 10]},
+        {"image_id": 3, "category_id": 90, "bbox": [640, 480, 10, 10]},
+    ]
+    assert pictures_of_coco(coco(annotations=entries), CLASSES).outside == ()
+
+
+def test_ids_that_are_written_as_text_are_numbers():
+    categories = [{"id": "90", "name": "hammer"}, {"id": "4", "name": "person"}, {"id": "cat-1", "name": "cat"}]
+    entries = [
+        {"image_id": "7", "category_id": 90, "bbox": BOX},
+        {"image_id": 7, "category_id": "4", "bbox": BOX},
+        {"image_id": 7, "category_id": "cat-1", "bbox": BOX},
+    ]
+    found = pictures_of_coco(coco(categories=categories, annotations=entries), CLASSES)
+    assert [label.class_name for label in found.pictures[1].labels] == ["hammer", "person"]
+
+
 @pytest.mark.parametrize("document", [[], "coco", None, 3])
 def test_anything_but_a_json_object_is_refused(document):
     with pytest.raises(ValueError, match="the file"):

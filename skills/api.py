@@ -9,6 +9,7 @@ leaf of the executive wraps each skill, turns exceptions into failures with caus
 from __future__ import annotations
 
 import enum
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -22,22 +23,16 @@ from skills.detection import NO_DETECTOR
 from skills.detection import Detection as Detection
 from skills.detection import Detector as Detector
 from skills.doorway import DoorMemory, Doorway
-from skills.relations import Landmark as Landmark
-from skills.relations import Relation as Relation
-from skills.relations import RelationKind as RelationKind
-from skills.robot import Clock, Image, Lease, Picture, Pose2D, Robot
+from skills.robot import Capabilities, Clock, Image, Lease, Picture, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
 from skills.world_model import FLOOR as FLOOR
-from skills.world_model import NO_TRAFFIC, Traffic
-from skills.world_model import NO_WORK_COUNTER as NO_WORK_COUNTER
+from skills.world_model import NO_TRAFFIC, NO_WORK_COUNTER, Traffic, WorkCounter
 from skills.world_model import ClearableCostmap as ClearableCostmap
 from skills.world_model import Costmap as Costmap
-from skills.world_model import ExcludesRobots as ExcludesRobots
 from skills.world_model import FilterType as FilterType
 from skills.world_model import FreeSpace as FreeSpace
 from skills.world_model import LocalisationEstimate as LocalisationEstimate
 from skills.world_model import Localiser as Localiser
-from skills.world_model import NoWorkCounter as NoWorkCounter
 from skills.world_model import ObjectKind as ObjectKind
 from skills.world_model import ObjectObservation as ObjectObservation
 from skills.world_model import ObstacleLayerView as ObstacleLayerView
@@ -48,7 +43,6 @@ from skills.world_model import SearchingLocaliser as SearchingLocaliser
 from skills.world_model import Surface as Surface
 from skills.world_model import SurveyView as SurveyView
 from skills.world_model import Tag as Tag
-from skills.world_model import WorkCounter as WorkCounter
 from skills.world_model import Zone as Zone
 from skills.world_model import ZoneKind as ZoneKind
 from skills.world_model import ZoneMask as ZoneMask
@@ -410,6 +404,16 @@ class Skill(ABC, Generic[InputsT]):
     def __init__(self, context: SkillContext, options: Any = None) -> None:
         self.context = context
         self.options = options or context.stack.skills.get(self.name) or self.Options()
+
+    @classmethod
+    def reached_heights_m(cls, capabilities: Capabilities) -> tuple[float, float]:
+        """Heights above the floor of the lowest and the highest surface at which it works; infinite without a limit."""
+        return -math.inf, math.inf
+
+    @classmethod
+    def refuses(cls, inputs: Mapping[str, Any], capabilities: Capabilities) -> tuple[str, str] | None:
+        """Error and hint for constant inputs, by name, with which no robot with these capabilities succeeds."""
+        return None
 
     @abstractmethod
     def begin(self, inputs: InputsT) -> None:

@@ -97,6 +97,14 @@ class GripperCapabilities:
         """Positions of the finger joints by name, at an opening."""
         return {name: share * opening for name, share in self.finger_joints}
 
+    def refusal(self, opening: float, force_n: float) -> str | None:
+        """Reason why the gripper cannot move to an opening with a force; None when it can."""
+        if 0.0 <= opening <= self.widest and 0.0 < force_n <= self.max_force_n:
+            return None
+        unit = "rad" if self.kind is GripperKind.HINGED else "m"
+        force = f"force {force_n:.0f} N in (0, {self.max_force_n}]"
+        return f"set_gripper: opening {opening:.3f} {unit} must lie in [0, {self.widest}] and {force}"
+
     def like_turn(self, turn_rad: float) -> float:
         """Returns the change of the opening that corresponds to a rotation of a hinged finger by `turn_rad`.
 
@@ -154,6 +162,14 @@ class HeadCapabilities:
     p_PT_m: tuple[float, float, float]
     pan_range_rad: tuple[float, float]
     tilt_range_rad: tuple[float, float]
+
+    def refusal(self, pan_rad: float, tilt_rad: float) -> str | None:
+        """Reason why the head cannot turn to a pan and a tilt; None when it can."""
+        (left, right), (up, down) = self.pan_range_rad, self.tilt_range_rad
+        if left <= pan_rad <= right and up <= tilt_rad <= down:
+            return None
+        tilt = f"tilt {tilt_rad:.2f} rad in [{up}, {down}]"
+        return f"point_head: pan {pan_rad:.2f} rad must lie in [{left}, {right}] and {tilt}"
 
     def X_BF(self, pan_rad: float, tilt_rad: float) -> RigidTransform:
         """Pose of the frame `head` in the body frame at a pan and a tilt angle."""

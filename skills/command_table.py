@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+import math
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from typing import Any, Final, Generic, TypeVar
 from uuid import uuid4
@@ -87,6 +88,22 @@ class CommandTable(CommandStatuses, Generic[PartT]):
     def running(self, part: PartT) -> Active | None:
         """Running command of a part; None when there is none."""
         return self._running.get(part)
+
+
+def refusal_of(
+    what: str, lost: str | None, values: Iterable[float], *, until_s: float, now_s: float
+) -> tuple[str, CommandCause] | None:
+    """Reason and cause for which every robot refuses a command; None when it may begin.
+
+    `lost` is why the lease does not count (None: it does), `values` are the numbers of the command.
+    """
+    if lost is not None:
+        return f"{what}: {lost}", CommandCause.NO_LEASE
+    if not all(map(math.isfinite, values)) or math.isnan(until_s):
+        return f"{what}: a value is not finite", CommandCause.INVALID
+    if until_s <= now_s:
+        return f"{what}: expires at {until_s:.2f} s, and it is {now_s:.2f} s already", CommandCause.LATE
+    return None
 
 
 class LeaseManager:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar, runtime_checkable
 
 from skills.robot import Image, Picture
 
 if TYPE_CHECKING:
-    from skills.perception.object_model import ObjectModel
-    from skills.perception.shape_model import ShapeModel
+    from pathlib import Path
+
+    from skills.world_model import Tag
 
 
 @dataclass(frozen=True)
@@ -38,8 +39,10 @@ class Detector(Protocol):
     A detector inherits from this class, implements `class_names` and `detect`, and may override the other methods.
     """
 
-    models: Mapping[str, ObjectModel] = MappingProxyType({})
+    models: Mapping[str, Any] = MappingProxyType({})
     """Object models by name, for objects that the user has added; skills match segments against them."""
+    about: str = ""
+    """Description of the network for the user: how its input and outputs are read."""
 
     @property
     @abstractmethod
@@ -47,7 +50,7 @@ class Detector(Protocol):
         """Names of the known classes."""
 
     @property
-    def shapes(self) -> ShapeModel | None:
+    def shapes(self) -> Any:
         """Model of the classes' shapes in depth, a second witness beside the scores; None for scores alone."""
         return None
 
@@ -70,6 +73,16 @@ class Detector(Protocol):
     def detect_with_depth(self, image: Image, found: Detections) -> Detections:
         """Returns `found`, the detections in the image's picture, which a detector may refine by the depth."""
         return found
+
+
+class Recogniser(Protocol):
+    """Function of the entry-point group `errand.recognisers`, which extends a detector by objects of a world."""
+
+    def __call__(self, detector: Detector, folders: Sequence[Path], tags: Sequence[Tag]) -> Detector:
+        """Returns a detector that also recognises imported objects, by their folders, or objects that carry tags.
+
+        Returns the given one when it adds nothing. Raises InputError when a folder cannot be used.
+        """
 
 
 class NoDetectorError(RuntimeError):
@@ -95,7 +108,7 @@ class DetectorWrapper(Detector):
 
     def __init__(self, detector: Detector) -> None:
         self._detector = with_defaults(detector)
-        self.models = self._detector.models
+        self.models, self.about = self._detector.models, self._detector.about
 
     def _call(self, method: str, pictures: int, call: Callable[..., AnswerT], *arguments: Any) -> AnswerT:
         """Calls `call`, a method of the wrapped detector; `pictures` is the number of pictures."""
@@ -107,7 +120,7 @@ class DetectorWrapper(Detector):
         return self._detector.class_names
 
     @property
-    def shapes(self) -> ShapeModel | None:
+    def shapes(self) -> Any:
         """Shapes of the wrapped detector's classes."""
         return self._detector.shapes
 
@@ -154,3 +167,18 @@ def box_overlap(a: tuple[float, float, float, float], b: tuple[float, float, flo
         return 0.0
     areas = [(box[2] - box[0]) * (box[3] - box[1]) for box in (a, b)]
     return float(width * height / max(sum(areas) - width * height, 1e-6))
+
+
+class DetectorComponent(Hashable, Protocol):
+    """Loads a detector."""
+
+    def build(self) -> Detector:
+        """Loads the detector. Raises InputError when its model cannot be used."""
+
+
+@runtime_checkable
+class PictureDetectorComponent(Protocol):
+    """Loads a detector for single pictures: each class that its network knows, in one view, from a threshold on."""
+
+    def build_for_pictures(self, threshold: float) -> Detector:
+        """Loads the detector. Raises InputError when its model cannot be used."""

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.robot import FloatArray, Scan, unit_rays
+from skills.robot import FloatArray, Robot, Scan, unit_rays
 
 if TYPE_CHECKING:
     from pydrake.math import RigidTransform
+
+    from skills.world_model import Localiser
 
 _STRIP_M = 0.05
 _HEIGHTS_M = (0.1, 1.9)
@@ -26,6 +28,13 @@ _BEYOND_M = 0.5
 _FEWEST = 5
 _CLEARLY = 0.8
 _LEAST_TOWARDS = 0.05
+_FEW_RAYS = 50
+REACH_M: Final = 4.0
+"""Largest distance at which a scan shows whether a door is closed."""
+FLATTEST_RAD: Final = 1.25
+"""Largest view angle at which it does."""
+CLOSED_M: Final = 0.1
+"""Width of its widest gap up to which a door counts as closed."""
 
 Bools = NDArray[np.bool_]
 Counts = NDArray[np.int64]
@@ -114,6 +123,38 @@ class DoorMemory:
     def last_seen(self, door: Doorway) -> SeenDoor:
         """State in which the robot last saw a door."""
         return self._seen.get(door.middle_W, SeenDoor())
+
+
+def look_at_doors(
+    doors: Sequence[Doorway],
+    memory: DoorMemory,
+    robot: Robot,
+    localiser: Localiser,
+    *,
+    reach_m: float = REACH_M,
+    flattest_rad: float = FLATTEST_RAD,
+    closed_m: float = CLOSED_M,
+) -> None:
+    """Updates the memory of the doors in view from the newest scan.
+
+    `reach_m` and `flattest_rad`: largest distance and view angle at which a scan is used. `closed_m`: a door counts as
+    closed while all its gaps are narrower, and as open when the robot fits through.
+    """
+    scan, estimate = robot.scan(), localiser.estimate()
+    if not doors or scan is None or not estimate.localised:
+        return
+    X_WL, sides = estimate.X_WO @ scan.X_OB @ scan.X_BL, [y for _, y in robot.capabilities().footprint_m]
+    place = float(X_WL.translation()[0]), float(X_WL.translation()[1])
+    for door in doors:
+        if door.distance_m(place) > reach_m or door.view_angle_rad(place) > flattest_rad:
+            continue
+        seen = measure_opening(door, [(scan, X_WL)])
+        if seen.rays >= _FEW_RAYS and seen.most_m <= closed_m:
+            memory.note(door, DoorState.CLOSED, scan.stamp_s)
+        elif seen.least_m >= max(sides) - min(sides):
+            memory.note(door, DoorState.OPEN, scan.stamp_s)
+        elif seen.least_m > closed_m and memory.last_seen(door).state is DoorState.CLOSED:
+            memory.note(door, DoorState.UNKNOWN, scan.stamp_s)
 
 
 def measure_opening(door: Doorway, scans: Iterable[tuple[Scan, RigidTransform]]) -> Opening:

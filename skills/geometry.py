@@ -1,7 +1,7 @@
 """Planar geometry: angles, poses and polygons."""
 
 import math
-from typing import TypeVar
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,10 @@ from skills.robot import FloatArray, Pose2D
 from skills.world_model import FreeSpace
 
 _SIGHT_STEP_M = 0.1
+SPOT_EDGE_M: Final = 0.09
+"""Distance of a comfortable spot from the edges of a surface."""
+_SPOTS_APART_M = 0.04
+_ROUNDING_M = 1e-6
 AngleT = TypeVar("AngleT", float, FloatArray)
 
 
@@ -73,6 +77,12 @@ def grid_inside(
     axes = (np.arange(a + first_m, b, step_m) for a, b in zip(corners.min(axis=0), corners.max(axis=0), strict=True))
     grid = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
     return np.asarray(grid[inside_polygon(grid, polygon, margin_m)])
+
+
+def surface_spots(polygon_W: tuple[tuple[float, float], ...], edge_m: float = SPOT_EDGE_M) -> FloatArray:
+    """Points (N, 2) on a convex surface at least edge_m from its edges; its centre when it is small."""
+    inside = grid_inside(polygon_W, _SPOTS_APART_M, first_m=edge_m, margin_m=_ROUNDING_M - edge_m)
+    return inside if len(inside) else np.asarray([np.mean(polygon_W, axis=0)])
 
 
 def inside_polygon(

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path, PurePosixPath, PureWindowsPath
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Final, Literal, Protocol
 
 import cv2
 import numpy as np
@@ -14,15 +15,30 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict
 
 from skills.compiled import distances
+from skills.geometry import grid_inside, inside_polygon
 from skills.inputs.errors import InputError, count_text, nearest_name
 from skills.inputs.outside import file_beside, is_file
 from skills.inputs.picture_files import Brightness, read_brightness
 from skills.inputs.schema import validate
 from skills.inputs.yaml_source import YamlSource, quoted_key, read_yaml
 from skills.quantities import Angle, Coordinate, Height, Quantity, Share
-from skills.robot import FloatArray
+from skills.robot import FloatArray, Pose2D
+from skills.world_model import Costmap, Localiser, Surface
 
 BoolGrid = NDArray[np.bool_]
+Cells = NDArray[np.int64]
+CELL_M: Final = 0.04
+"""Side of a cell."""
+LEVELS: Final = np.arange(round(0.08 / CELL_M), round(2.0 / CELL_M))
+"""Levels of the cells of a column, from just above the floor to above the arm."""
+_AGREE_M = 0.03
+"""Noise of the grids: distance within which an occupied cell of one counts as occupied in another."""
+_AT_SURFACE_M = 0.06
+"""Distance from a surveyed surface within which occupied cells are its edge."""
+_FEWEST_COLUMNS = 8
+"""Number of connected columns from which on they are a wall."""
+_BELOW_TOP_M = 0.01
+"""Distance from a surveyed surface down to the solid below it."""
 MOST_CELLS: Final = 16_000_000
 UNKNOWN_GREY: Final = 205
 """The grey that map_saver writes for unknown ground."""
@@ -347,3 +363,53 @@ def _by_thresholds(shares: NDArray[np.float64], file: _MapFile) -> tuple[BoolGri
         return probability >= (file.free_thresh + file.occupied_thresh) / 2.0, np.zeros(shares.shape, dtype=np.bool_)
     occupied = probability > file.occupied_thresh
     return occupied, ~occupied & (probability >= file.free_thresh)
+
+
+def map_columns(grids: Sequence[GridMap], surfaces: Sequence[Surface]) -> Cells:
+    """Columns (N, 3) of solid cells, x, y and one past the highest level: walls, and all below a lowest surface."""
+    walls = wall_columns(grids, surfaces)
+    columns = [np.insert(walls, 2, LEVELS[-1] + 1, axis=1)]
+    for surface in sorted(surfaces, key=lambda surface: surface.height_m):
+        below = np.floor(grid_inside(surface.polygon_W, CELL_M, margin_m=1e-6) / CELL_M).astype(np.int64)
+        columns.append(np.insert(below, 2, math.floor((surface.height_m - _BELOW_TOP_M) / CELL_M), axis=1))
+    every = np.vstack(columns)
+    return every[np.sort(np.unique(every[:, :2], axis=0, return_index=True)[1])]
+
+
+def wall_columns(grids: Sequence[GridMap], surfaces: Iterable[Surface]) -> Cells:
+    """Columns (N, 2) of cells that are occupied in all grids of a map, and thus solid at all their heights.
+
+    A grid has no heights, and a LiDAR's band shows table tops and their edges. So the columns exclude surveyed
+    surfaces, over which the arm reaches, and single posts, such as chair legs.
+    """
+    first, *others = sorted(grids, key=lambda grid: np.count_nonzero(grid.occupied))
+    points_W = first.centres(np.argwhere(first.occupied))
+    for grid in others:
+        points_W = points_W[grid.distance_m(points_W) < _AGREE_M]
+    for surface in surfaces:
+        points_W = points_W[~inside_polygon(points_W, surface.polygon_W, _AT_SURFACE_M)]
+    columns = np.unique(np.floor(points_W / CELL_M).astype(np.int64), axis=0)
+    if len(columns) == 0:
+        return columns
+    low = columns.min(axis=0)
+    picture = np.zeros(columns.max(axis=0) - low + 1, dtype=np.uint8)
+    picture[tuple((columns - low).T)] = 1
+    _, parts, about, _ = cv2.connectedComponentsWithStats(picture)
+    return np.asarray(np.argwhere((parts > 0) & (about[parts, cv2.CC_STAT_AREA] >= _FEWEST_COLUMNS)) + low)
+
+
+class LocaliserComponent(Protocol):
+    """Builds the localiser of one robot."""
+
+    def build(self, grid: GridMap, start: Pose2D | None, *, surely: bool) -> Localiser:
+        """Builds a localiser on a surveyed grid; `start` is the robot's start pose, None when it is unknown.
+
+        `surely` is False when the robot may have been moved since it was at `start`.
+        """
+
+
+class CostmapComponent(Protocol):
+    """Builds the costmap of one robot."""
+
+    def build(self, keepout: GridMap) -> Costmap:
+        """Builds a costmap on a surveyed keep-out grid."""

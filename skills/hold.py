@@ -1,4 +1,4 @@
-"""Monitor of the object in the gripper: detects a loss and a slip from the gripper's measurements, within 0.3 s."""
+"""Monitor of the object in the gripper: detects a loss and a slip from the gripper's measurements, within 0.5 s."""
 
 import enum
 from dataclasses import dataclass, field, replace
@@ -32,16 +32,17 @@ class HoldWatch:
 
     `patience_s`: how long the gripper reports no object until the object counts as lost. `slip_rad`: closing by more
     than this is a slip. `slip_force` and `slip_s`: so is a force below this fraction of its first value for this time.
-    `settle_s`: after a firmer grip, further closing is judged only after this time. `regrip_s`: fingers that stay apart
-    have this long to feel the object after a firmer grip. `released_rad`: opening by more than this is a deliberate
-    release.
+    `settle_s`: after a firmer grip, further closing is judged only after this time. `regrip_s`: after a firmer grip,
+    fingers wider than `shut_rad` have this long to feel the object again. `released_rad`: opening by more than this is
+    a deliberate release.
     """
 
     patience_s: float = 0.05
     slip_rad: float = 0.05
     slip_force: float = 0.5
     slip_s: float = 0.05
-    regrip_s: float = 0.2
+    regrip_s: float = 0.5
+    shut_rad: float = 0.03
     settle_s: float = 0.5
     released_rad: float = 0.08
     force_n: float = field(default=0.0, init=False)
@@ -73,7 +74,7 @@ class HoldWatch:
         """Classifies a measurement without an object; fingers that stay apart may still have it between them."""
         self._empty_since_s = now_s if self._empty_since_s is None else self._empty_since_s
         assert self._opening is not None
-        apart = reading.opening > self._opening - self.slip_rad
+        apart = reading.opening > self.shut_rad
         if apart and self._gripped_again_s is not None and now_s < self._gripped_again_s + self.regrip_s:
             return Grip.HELD
         return Grip.LOST if now_s - self._empty_since_s >= self.patience_s - _TOLERANCE_S else Grip.HELD
@@ -104,8 +105,8 @@ def hold_watch(capabilities: Capabilities) -> HoldWatch:
     usual = HoldWatch(patience_s=period_s, slip_s=period_s)
     if gripper is None:
         return usual
-    slip, released = gripper.like_turn(usual.slip_rad), gripper.like_turn(usual.released_rad)
-    return replace(usual, slip_rad=slip, released_rad=released)
+    slip, shut, released = map(gripper.like_turn, (usual.slip_rad, usual.shut_rad, usual.released_rad))
+    return replace(usual, slip_rad=slip, shut_rad=shut, released_rad=released)
 
 
 def firmer_n(force_n: float, capabilities: Capabilities) -> float:

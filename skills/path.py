@@ -1,10 +1,14 @@
-"""Planned paths: closely spaced poses, the distance along them, and the smoothing of a lattice path.
+"""Planned paths: closely spaced poses, their planners and controllers, and the smoothing of a lattice path.
 
 Smoothing takes shortcuts, then relaxes the path like an elastic band; every step checks the clearance.
 """
 
+from __future__ import annotations
+
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -12,6 +16,11 @@ from skills.compiled import compiled
 from skills.footprint import clearance_at
 from skills.motion_cost import TURNING_RADIUS_M, Space, clearance_needed, drive_cost, segment_cost, zone_factor
 from skills.robot import FloatArray, Pose2D
+
+if TYPE_CHECKING:
+    from skills.footprint import Footprint
+    from skills.world_model import FreeSpace, WorkCounter
+    from skills.zone_map import ZoneMap
 
 TURN_M_PER_RAD = 0.4
 """Metres of progress along a path for a turn of one radian."""
@@ -174,3 +183,72 @@ def clearances(space: Space, poses: FloatArray) -> FloatArray:
     for n in range(poses.shape[0]):
         values[n] = clearance_at(space.field, poses[n, 0], poses[n, 1], poses[n, 2])
     return values
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Command for one tick: body-frame velocity, remaining path (m, turns included), and distance from it (m).
+
+    `blocked_at` is the world (x, y) of the obstacle that blocks the path ahead; None when the path is clear.
+    """
+
+    velocity: tuple[float, float, float]
+    remaining_m: float
+    off_path_m: float
+    blocked_at: tuple[float, float] | None
+
+
+class GlobalPlanner(Protocol):
+    """Plans paths for the base."""
+
+    def problem(
+        self,
+        costmap: FreeSpace,
+        footprint: Footprint,
+        start: Pose2D,
+        goal: Pose2D,
+        *,
+        max_speed_m_s: float,
+        work: WorkCounter = ...,
+        zones: ZoneMap | None = ...,
+    ) -> Callable[[], Path]:
+        """Samples the costmap now; returns a function that plans on that sample, in any thread.
+
+        That function raises PlanningError when there is no path, and counts its computations in `work`. `zones` adds
+        costs and allowed directions of motion; the costmap already contains the keep-out zones as obstacles.
+        """
+
+
+class LocalController(Protocol):
+    """Follows one path."""
+
+    length_m: float
+
+    def command(
+        self,
+        pose: Pose2D,
+        velocity: tuple[float, float, float],
+        last: FloatArray,
+        costmap: FreeSpace,
+        most_m_s: float = np.inf,
+    ) -> Drive:
+        """Returns the velocity to command at a world pose and body velocity; `last` (3,) is the previous command."""
+
+    def ahead(self, way_m: float) -> FloatArray:
+        """Returns the path's poses (N, 3) over the next `way_m`, from the robot's last position on the path."""
+
+    def pose_after(self, way_m: float) -> Pose2D:
+        """Returns the path's pose `way_m` beyond the robot's last position on the path."""
+
+
+class ControllerComponent(Protocol):
+    """Builds a controller for each path; a robot farther than `lost_path_m` from the path abandons it.
+
+    `max_speed_m_s` is the controller's own speed limit; infinite when it has none.
+    """
+
+    lost_path_m: float
+    max_speed_m_s: float = np.inf
+
+    def build(self, path: Path, footprint: Footprint, *, max_speed_m_s: float) -> LocalController:
+        """Builds a controller that follows a path."""

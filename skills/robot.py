@@ -15,6 +15,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NewType, Protocol
@@ -415,6 +416,17 @@ class ConnectedRobot:
     clock: Clock
     make_ready: Callable[[], None] = lambda: None
     notes: tuple[str, ...] = ()
+
+
+class RobotBackend(Protocol):
+    """Connects to robots of one make. Its fields are the options of an address: `spot://HOST?power_on=yes`."""
+
+    def connect(self, address: str, name: str) -> AbstractContextManager[ConnectedRobot]:
+        """Connects to the robot at an address without scheme and options; `name` is its name in missions.
+
+        At exit, also when the block raises, the robot is left in the state in which it was found. Raises InputError
+        when the robot cannot be reached or is not ready.
+        """
 
 
 class NoImageError(RuntimeError):

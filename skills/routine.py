@@ -39,6 +39,7 @@ class Patience:
 ResultT = TypeVar("ResultT")
 OtherT = TypeVar("OtherT")
 Routine = Generator[Running, None, ResultT]
+"""Generator that yields `Running` at each tick, and returns a result."""
 
 ARM_EXPIRY_MARGIN_S = 3.0
 STAND_EXPIRY_S = 6.0

@@ -8,36 +8,33 @@ a stack file may set, its docstring explains them, and it implements the slot's 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Hashable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, Protocol, get_type_hints
+from typing import TYPE_CHECKING, Any, Final, get_type_hints
 
-import numpy as np
-
-from skills.inputs.errors import suggestion
-from skills.inputs.plugins import OURS, PluginDefect, distribution_of, installed_plugins, run_plugin
+from skills.inputs.errors import InputError, suggestion
+from skills.inputs.outside import is_file, is_there
+from skills.inputs.plugins import (
+    OURS,
+    STACKS,
+    PluginDefect,
+    distribution_of,
+    installed_plugins,
+    package_folder,
+    run_plugin,
+)
 from skills.inputs.schema import first_error
 from skills.quantities import display_text
-from skills.robot import ConnectedRobot, FloatArray, GripperCapabilities, Pose2D
 
 if TYPE_CHECKING:
-    from skills.detection import Detector
-    from skills.footprint import Footprint
-    from skills.grid_map import GridMap
-    from skills.manipulation.arm.collision import ArmScene
-    from skills.manipulation.arm.motion import ArmPlanner
-    from skills.manipulation.grasp.candidates import GraspCandidate
-    from skills.manipulation.grasp.placements import Target
-    from skills.manipulation.grasp.planning import GraspPlan, Surroundings
-    from skills.navigate.follower import Drive
-    from skills.path import Path as WayPath
-    from skills.world_model import Costmap, FreeSpace, Localiser, WorkCounter
-    from skills.zone_map import ZoneMap
+    from skills.detection import DetectorComponent
+    from skills.grid_map import CostmapComponent, LocaliserComponent
+    from skills.path import ControllerComponent, GlobalPlanner
+    from skills.robot import RobotBackend
 
 SLOTS: Final[Mapping[str, str]] = {
     "localiser": "errand.localisers",
@@ -57,122 +54,8 @@ DOORS: Final = "errand.doors"
 """Entry-point group of the plug-ins that open doors (`skills.doorway.DoorOpener`)."""
 BACKENDS: Final = "errand.backends"
 """Entry-point group of the backends that drive robots; an entry's name is the URL scheme, as in `spot://HOST`."""
-PLUGINS: Final[Mapping[Any, str]] = {"graph_nav": "errand-spot", "rolling": "errand-make", "spot": "errand-spot"}
-"""Plug-ins of this project, by the component or URL scheme that they provide."""
 PLUGIN: Final = "plugin"
 DEFAULT_FILE: Final = Path(__file__).with_name("default_stack.yaml")
-
-
-class LocaliserComponent(Protocol):
-    """Builds the localiser of one robot."""
-
-    def build(self, grid: GridMap, start: Pose2D | None, *, surely: bool) -> Localiser:
-        """Builds a localiser on a surveyed grid; `start` is the robot's start pose, None when it is unknown.
-
-        `surely` is False when the robot may have been moved since it was at `start`.
-        """
-
-
-class CostmapComponent(Protocol):
-    """Builds the costmap of one robot."""
-
-    def build(self, keepout: GridMap) -> Costmap:
-        """Builds a costmap on a surveyed keep-out grid."""
-
-
-class GlobalPlanner(Protocol):
-    """Plans paths for the base."""
-
-    def problem(
-        self,
-        costmap: FreeSpace,
-        footprint: Footprint,
-        start: Pose2D,
-        goal: Pose2D,
-        *,
-        max_speed_m_s: float,
-        work: WorkCounter = ...,
-        zones: ZoneMap | None = ...,
-    ) -> Callable[[], WayPath]:
-        """Samples the costmap now; returns a function that plans on that sample, in any thread.
-
-        That function raises PlanningError when there is no path, and counts its computations in `work`. `zones` adds
-        costs and allowed directions of motion; the costmap already contains the keep-out zones as obstacles.
-        """
-
-
-class LocalController(Protocol):
-    """Follows one path."""
-
-    length_m: float
-
-    def command(
-        self,
-        pose: Pose2D,
-        velocity: tuple[float, float, float],
-        last: FloatArray,
-        costmap: FreeSpace,
-        most_m_s: float = np.inf,
-    ) -> Drive:
-        """Returns the velocity to command at a world pose and body velocity; `last` (3,) is the previous command."""
-
-    def ahead(self, way_m: float) -> FloatArray:
-        """Returns the path's poses (N, 3) over the next `way_m`, from the robot's last position on the path."""
-
-    def pose_after(self, way_m: float) -> Pose2D:
-        """Returns the path's pose `way_m` beyond the robot's last position on the path."""
-
-
-class ControllerComponent(Protocol):
-    """Builds a controller for each path; a robot farther than `lost_path_m` from the path abandons it.
-
-    `max_speed_m_s` is the controller's own speed limit; infinite when it has none.
-    """
-
-    lost_path_m: float
-    max_speed_m_s: float = np.inf
-
-    def build(self, path: WayPath, footprint: Footprint, *, max_speed_m_s: float) -> LocalController:
-        """Builds a controller that follows a path."""
-
-
-class GraspPlanner(Protocol):
-    """Plans grasps and the motions to them."""
-
-    def candidates(self, target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> list[GraspCandidate]:
-        """Returns grasp candidates, the best first; an empty list for an object that is too wide or too flat.
-
-        `p_BS` is the position of the shoulder.
-        """
-
-    def plan(
-        self,
-        scene: ArmScene,
-        q_start_rad: FloatArray,
-        candidates: Sequence[GraspCandidate],
-        around: Surroundings,
-        arm_planner: ArmPlanner,
-        rng: np.random.Generator,
-    ) -> GraspPlan:
-        """Plans the best feasible candidate. Raises PlanningError when none is feasible."""
-
-
-class DetectorComponent(Hashable, Protocol):
-    """Loads a detector."""
-
-    def build(self) -> Detector:
-        """Loads the detector. Raises InputError when its model cannot be used."""
-
-
-class RobotBackend(Protocol):
-    """Connects to robots of one make. Its fields are the options of an address: `spot://HOST?power_on=yes`."""
-
-    def connect(self, address: str, name: str) -> AbstractContextManager[ConnectedRobot]:
-        """Connects to the robot at an address without scheme and options; `name` is its name in missions.
-
-        At exit, also when the block raises, the robot is left in the state in which it was found. Raises InputError
-        when the robot cannot be reached or is not ready.
-        """
 
 
 @dataclass(frozen=True)
@@ -183,8 +66,8 @@ class RobotStack:
     costmap: CostmapComponent
     planner: GlobalPlanner
     controller: ControllerComponent
-    arm_planner: ArmPlanner
-    grasp_planner: GraspPlanner
+    arm_planner: Any
+    grasp_planner: Any
     detector: DetectorComponent
     locomotion: Any
     names: Mapping[str, str]
@@ -217,6 +100,22 @@ def _default_data() -> dict[str, Any]:
 def default_component(slot: str) -> Any:
     """Returns the component that fills a slot in the default stack, without importing those of the other slots."""
     return _component(slot, _default_data()[slot])[1]
+
+
+def stack_file(given: Path) -> Path:
+    """Path of a stack file: the given path, or the file that the project or a plug-in registers by that name.
+
+    Raises InputError for an unknown name.
+    """
+    if given != Path(given.name) or given.suffix or is_file(given):
+        return given
+    found = {each.name: each for each in installed_plugins(STACKS)}
+    if given.name in found:
+        return package_folder(found[given.name]) / f"{given.name}_stack.yaml"
+    own = DEFAULT_FILE.with_name(f"{given.name}_stack.yaml")
+    if is_there(given) or is_file(own):
+        return own if is_file(own) else given
+    raise InputError(f"there is no stack '{given.name[:60]}'", hint=suggestion(given.name, ("default", *found)))
 
 
 def stack_of(data: Any, folder: Path = Path()) -> RobotStack:
@@ -257,8 +156,7 @@ def _component(slot: str, given: Any) -> tuple[str, Any]:
     known = _names(slot)
     name = given.get(USE, known[0])
     if name not in known:
-        hint = f"pip install {PLUGINS[name]}" if name in PLUGINS else suggestion(str(name), known)
-        raise StackError((slot, USE), f"there is no {slot} {display_text(name)}", hint)
+        raise StackError((slot, USE), f"there is no {slot} {display_text(name)}", suggestion(str(name), known))
     return name, _typed(
         (slot,), _loaded(slot, name, SLOTS[slot]), {key: value for key, value in given.items() if key != USE}
     )
@@ -286,8 +184,8 @@ def robot_backend(scheme: str, given: Mapping[str, Any]) -> RobotBackend:
     if known.count(scheme) != 1:
         several = scheme in known
         what = f"{'several plug-ins drive' if several else 'no plug-in drives'} robots of '{scheme[:60]}://'"
-        missing = f"pip install {PLUGINS[scheme]}" if scheme in PLUGINS else suggestion(scheme, sorted(known))
-        raise StackError((), what, "uninstall all but one; errand plugins names them" if several else missing)
+        hint = "uninstall all but one; errand plugins names them" if several else suggestion(scheme, sorted(known))
+        raise StackError((), what, hint)
     backend: RobotBackend = _typed((), _loaded(scheme, scheme, BACKENDS), given)
     for key in (key for key, value in given.items() if value is True and getattr(backend, key) is not True):
         raise StackError((key,), "has no value", f"write {key}=VALUE")

@@ -16,7 +16,7 @@ TRAIN = "plugins/errand-train"
         ("tests/missions/test_faults.py", "executive/app/runs/simulated.py", True),  # by tests/missions/flat_mission.py
         ("tests/plant/worlds/test_shipped_worlds.py", "plant/worlds/flat/objects.yaml", True),
         ("tests/executive/words/test_command.py", "plant/worlds/flat/objects.yaml", False),
-        ("tests/executive/words/test_command.py", "skills/navigate/mppi.py", False),
+        ("tests/executive/words/test_command.py", "skills/navigate/lattice.py", False),
         ("tests/executive/words/test_command.py", "README.md", False),
         ("tests/docs/test_readme.py", "README.md", True),
         ("tests/skills/faults/test_faults.py", "tests/skills/faults/test_faults.yaml", True),

@@ -1,8 +1,10 @@
 """A user's project uses Errand as a library, also where it has folders of Errand's names."""
 
+import shutil
 import subprocess
 import sys
 import tomllib
+import zipfile
 
 import pytest
 
@@ -56,3 +58,19 @@ def test_each_distribution_ships_its_types(folder):
     packages = {name.rstrip("*") for name in settings["packages"]["find"]["include"]} - {"missions"}
     assert typed == packages
     assert [name for name in packages if "py.typed" not in data.get(name, ())] == []
+
+
+BUILD = "from setuptools import build_meta; build_meta.build_editable('.')"
+
+
+@pytest.mark.parametrize("folder", DISTRIBUTIONS)
+def test_type_checkers_find_an_editable_installation_by_a_path(folder, tmp_path):
+    for name in ("pyproject.toml", "README.md", "LICENSE", "VERSION"):
+        shutil.copy(ROOT / folder / name, tmp_path)
+    for marker in (ROOT / folder).glob("*/py.typed"):
+        (tmp_path / marker.parent.name).mkdir()
+        (tmp_path / marker.parent.name / "__init__.py").touch()
+    assert python(tmp_path, "-c", BUILD).returncode == 0
+    (wheel,) = map(zipfile.ZipFile, tmp_path.glob("*.whl"))
+    (top,) = (name for name in wheel.namelist() if "/" not in name)
+    assert top.endswith(".pth") and wheel.read(top).decode().strip() == str(tmp_path)

@@ -12,11 +12,9 @@ import numpy as np
 from numba.core.dispatcher import Dispatcher
 
 from executive.app.prepare.from_request import prepare
-from executive.app.prepare.worlds import open_world
 from executive.app.runs.one_run import run_request
 from executive.app.runs.simulated import SimulatedBackend
 from executive.mission.request import Request
-from executive.words.mission import DEFAULT_WORLD
 from executive.words.robot_config import RobotConfig
 from skills.compiled import CompiledFunction
 from skills.inputs.errors import InputError
@@ -30,7 +28,7 @@ steps: [{skill: navigate, with: {x: 5.2, y: 4.5, yaw: 3.1416}}]
 
 _DRIVES: Final = (
     ("spot", None),
-    ("spot", "{localiser: {use: scan_matching}, controller: {use: mppi}}"),
+    ("spot", "{localiser: {use: scan_matching}}"),
     ("fetch", None),
 )
 """Kinds of robots, and the components in place of their default ones."""
@@ -53,17 +51,17 @@ def newly_compiled() -> int:
 
 
 def kernel_steps() -> Sequence[Callable[[], None]]:
-    """Functions that each run numeric code briefly: drives, an arm, scans, and the functions of plug-ins.
+    """Functions that each run numeric code briefly: drives, the scripted robot, and what is registered.
 
     All together take a few seconds if their code is cached. A plug-in's function raises InputError if it fails.
     """
     drives = (partial(_drive, kind, stack) for kind, stack in _DRIVES)
-    of_plugins = (partial(_compile_plugin, entry) for entry in installed_plugins(KERNELS))
-    return (*drives, _solve_arm, _map_cells, _match_scan, _see_blocks, *of_plugins)
+    registered = (partial(_compile_registered, entry) for entry in installed_plugins(KERNELS))
+    return (*drives, _see_blocks, *registered)
 
 
-def _compile_plugin(entry: EntryPoint) -> None:
-    """Loads and calls the function that a plug-in registers. Raises InputError."""
+def _compile_registered(entry: EntryPoint) -> None:
+    """Loads and calls a registered function. Raises InputError."""
     try:
         run_plugin(entry, lambda: entry.load()(), limit_s=_LIMIT_S)
     except PluginDefect as defect:
@@ -86,45 +84,6 @@ def _drive_in(folder: Path, kind: str, components: str | None) -> None:
     robots = (RobotConfig("Alice", kind, stack=stack),)
     prepared = prepare(Request(file=mission, out=folder, record=False, time_limit_s=_DRIVEN_S, robots=robots))
     run_request(prepared, SimulatedBackend(prepared.world, prepared.robots, seed=1, record=False))
-
-
-def _solve_arm() -> None:
-    """Solves the inverse kinematics of an arm with seven joints, and checks it for collisions with a box."""
-    from pydrake.math import RigidTransform
-
-    from plant.robots.robot_kind import robot_kind
-    from skills.manipulation.arm.collision import ArmScene, Box, gaps_m
-    from skills.manipulation.arm.kinematics import arm_model
-
-    capabilities = robot_kind("fetch").capabilities()
-    model = arm_model(capabilities)
-    q_rad = np.full(7, 0.5)
-    model.inverse(model.X_BH(q_rad))
-    scene, box = ArmScene(capabilities, model, {}), Box(RigidTransform([2.0, 0.0, 0.0]), (0.1, 0.1, 0.1))
-    scene.set_boxes([box])
-    scene.edge_free(q_rad, q_rad)
-    gaps_m(box, [box], np.zeros((1, 3)))
-
-
-def _map_cells() -> None:
-    """Adds a depth picture to the arm's occupied cells."""
-    from pydrake.math import RigidTransform
-
-    from skills.manipulation.arm.solid_cells import Outline, add_picture
-    from skills.robot import FrameTree, Image, Intrinsics
-
-    lens, depth_m = Intrinsics(2, 2, 1.0, 1.0, 1.0, 1.0), np.ones((2, 2), dtype=np.float32)
-    image = Image(0.0, "hand", "odom", lens, lens, None, np.zeros((2, 2), dtype=np.uint8), depth_m, FrameTree({}))
-    own = Outline(RigidTransform(), np.zeros(2), np.zeros(2))
-    add_picture(np.empty((0, 3), dtype=np.int64), image, RigidTransform(), own)
-
-
-def _match_scan() -> None:
-    """Localises in a world's map by scan matching."""
-    from skills.estimate.matching import score_poses
-    from skills.grid_map import load_grid_map
-
-    score_poses(load_grid_map(open_world(DEFAULT_WORLD).scan_map_path), np.ones((2, 3)), np.ones((1, 3)))
 
 
 def _see_blocks() -> None:

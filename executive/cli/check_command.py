@@ -25,7 +25,7 @@ from skills.inputs.errors import InputError, count_text, one_line
 SHOWN_NODES: Final = 40
 
 
-@takes_request("sentence", "answers", "world", "given", "stack", "start", "robots")
+@takes_request("sentence", "answers", "world", "given", "stack", "start", "robots", "time_of_day")
 def check(
     request: Request,
     context: typer.Context,
@@ -65,6 +65,7 @@ def to_json(checked: Sequence[Checked]) -> dict[str, Any]:
         "ok": all(one.ok for one in checked),
         "errors": [_error_json(error) for one in checked for error in one.errors],
         "warnings": [_error_json(warning) for one in checked for warning in one.warnings],
+        "detectors": [about for one in checked for about in one.detectors],
         "nodes": sum(len(tree.path_ids) for tree in trees),
         "commands": [str(command) for tree in trees for command in tree.commands],
         "estimates": [_estimate_json(one) for one in checked if one.ok],
@@ -99,6 +100,8 @@ def _show(one: Checked, name: str, console: Console, *, verbose: bool) -> None:
         typer.echo(f"errand: {error}", err=True)
     for warning in one.warnings:
         typer.echo(f"errand: warning: {warning}", err=True)
+    for about in one.detectors:
+        console.print(f"  detector: {about}", markup=False)
     for tree in one.trees if verbose else ():
         for command in tree.commands:
             console.print(f"  {command}", markup=False)

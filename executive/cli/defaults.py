@@ -79,8 +79,9 @@ def _values(file: Path) -> dict[str, Any]:
 
     try:
         return tomllib.loads(read_text(file))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"it is no TOML ({error})", hint="correct it there", file=file) from error
+    except (ValueError, RecursionError) as error:
+        what = "it is nested too deeply" if isinstance(error, RecursionError) else f"it is no TOML ({error})"
+        raise InputError(what, hint="correct it there", file=file) from error
 
 
 def _path(folder: Path, value: str, *, is_name: bool) -> str:

@@ -67,6 +67,8 @@ def detect(
         if one.error is not None:
             typer.echo(f"errand: {one.error}", err=True)
     if not as_json:
+        if detector.about:
+            console_for(as_json).print(f"detector: {detector.about}", markup=False)
         _show(console_for(as_json), results)
     good = all(one.error is None for one in results)
     finish([one.to_json() for one in results], as_json, good=good, otherwise=BAD_INPUT)

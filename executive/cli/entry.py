@@ -9,12 +9,15 @@ import atexit
 import gc
 import logging
 import os
+import re
 import sys
 import threading
 from collections.abc import Mapping
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from types import FunctionType
 from typing import Annotated, Any, Final, NoReturn
@@ -23,7 +26,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
-from skills.inputs.errors import MOST_LETTERS, InputError, listing, one_line
+from skills.inputs.errors import MOST_LETTERS, InputError, listing, nearest_name, one_line
 
 _COLLECTED_AFTER: Final = (400_000, 20, 50)
 """Thresholds of the three generations of garbage collection; imports create many objects that all stay."""
@@ -32,6 +35,14 @@ _COLLECTED_AFTER: Final = (400_000, 20, 50)
 COMMANDS_GROUP: Final = "errand.commands"
 """The entry-point group of plug-ins: name = the word after `errand`, or GROUP.NAME below a group of Errand; value = a
 `typer.Typer` or a function with typer's options."""
+_COMPLETED: Final = frozenset({"file", "files", "world", "run"})
+"""Parameters whose values a shell completes."""
+_HELP: Final = (
+    r'^def {0}\((?:(?!^\w).)*?\n    """(?P<function>[^"\n]+)'
+    r'|^{0} = typer\.Typer\((?:(?!^\w).)*?help="(?P<group>[^"\n]+)"'
+)
+"""First line of a function's docstring, or the help of a `typer.Typer`, in a module's text."""
+_PLUG_INS: Final = "Plug-ins bring more commands: docs/how-to/commands.md names them."
 EXIT_CODES: Final = "Exit codes: 0 success; 1 the mission was not achieved; 2 bad input, named in one line."
 
 
@@ -71,37 +82,9 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "shell": _Command("shell_command", "Take one command after another in one process, which starts them faster."),
     "doctor": _Command("doctor_command", "Look at what a run needs on this machine; names the mend of each fault."),
     "warm-up": _Command("doctor_command", "Compile the numeric code for this machine, so that runs begin at once."),
-    "new": _Command("new_command", "Write an installable package with a skill, or with a robot."),
+    "new": _Command("new_command", "Write an installable package with a skill, a task or a robot."),
 }
 """Commands of Errand by name, in the order of the help; commands of plug-ins follow them."""
-
-
-@dataclass(frozen=True)
-class _PluginCommand:
-    """Command that one of this project's plug-ins registers: the plug-in's distribution, and the command's help."""
-
-    distribution: str
-    help: str
-
-    @property
-    def missing(self) -> str:
-        """Dimmed help line for a plug-in that is not installed."""
-        return typer.style(f"Not installed: pip install {self.distribution}", dim=True)
-
-
-PLUGIN_COMMANDS: Final[Mapping[str, _PluginCommand]] = {
-    "serve": _PluginCommand("errand-spot", "Serve Spot's API for a simulated Spot, for programs of its SDK."),
-    "sdk": _PluginCommand("errand-spot", "Run a program of Spot's SDK, unchanged, with a simulated Spot."),
-    "map": _PluginCommand("errand-make", "Maps that the robot builds itself, by exploring or along a route."),
-    "world": _PluginCommand("errand-make", "Worlds from any map, and drawings of worlds."),
-    "object": _PluginCommand("errand-make", "Objects of your own: import any mesh as a model."),
-    "new.robot": _PluginCommand("errand-make", "Write a package with a robot from a URDF."),
-    "dataset": _PluginCommand("errand-train", "Labelled pictures for the detector; training and scores."),
-    "ros2": _PluginCommand("errand-ros2", "Logs as ROS 2 bags."),
-    "serve-ros2": _PluginCommand("errand-ros2", "Serve a simulated robot in ROS 2, without ROS installed."),
-    "teleop": _PluginCommand("errand-teleop", "Drive a robot's body and arm by hand: keys, gamepad, live page."),
-}
-"""Commands of this project's plug-ins by name, listed by the help also where they are not installed."""
 
 
 def shipped_command(name: str) -> Any:
@@ -125,29 +108,47 @@ def as_command(name: str, found: Any) -> Any:
 
 
 def _with_epilog(command: Any) -> Any:
-    """Adds the exit codes to the help of a command and of its subcommands."""
+    """Adds the exit codes to the help of a command and of its subcommands, and completion to their parameters."""
     command.epilog = command.epilog or EXIT_CODES
+    for each in command.params:
+        if each.name in _COMPLETED:
+            each.shell_complete = partial(_complete, each.name)
     for each in getattr(command, "commands", {}).values():
         _with_epilog(each)
     return command
 
 
+def _complete(parameter: str, _context: Any, typed: str) -> list[Any]:
+    from executive.cli.options import items_of
+
+    return items_of(parameter, typed)
+
+
 def help_lines() -> dict[str, str]:
     """Returns the help for commands of plug-ins, by name, without importing the plug-ins.
 
-    A command that this project has no help for gets the summary of its distribution. Reads the metadata files directly,
-    because importing `importlib.metadata` takes longer than the whole help.
+    Reads the metadata files directly, because importing `importlib.metadata` takes longer than the whole help.
     """
     lines = dict[str, str]()
     for folder in map(Path, sys.path):
         for info in (*folder.glob("*.dist-info"), *folder.glob("*.egg-info")):
             section = _text(info / "entry_points.txt").partition(f"[{COMMANDS_GROUP}]\n")[2].partition("\n[")[0]
-            names = [line.partition("=")[0].strip() for line in section.splitlines() if "=" in line]
-            owner = info.stem.partition("-")[0].replace("_", "-")
-            ours = {name: each.help for name, each in PLUGIN_COMMANDS.items() if each.distribution == owner}
-            lines |= {name: ours.get(name) or _summary(info) for name in names if name not in COMMANDS}
-    listed = {name: lines.pop(name, each.missing) for name, each in PLUGIN_COMMANDS.items()}
-    return listed | dict(sorted(lines.items()))
+            rows = [line.partition("=") for line in section.splitlines() if "=" in line]
+            named = {name.strip(): value.strip() for name, _, value in rows if name.strip() not in COMMANDS}
+            lines |= {name: _help_of(value) or _summary(info) for name, value in named.items()}
+    return dict(sorted(lines.items()))
+
+
+def _help_of(value: str) -> str:
+    """First line of the help in the source of a command, whose code does not run; empty when none is found."""
+    module, _, name = value.partition(":")
+    package, *below = module.split(".")
+    spec = find_spec(package)
+    places = [Path(folder, *below) for folder in (spec and spec.submodule_search_locations) or ()]
+    files = [file for each in places for file in (each.with_suffix(".py"), each / "__init__.py")]
+    pattern = re.compile(_HELP.format(re.escape(name)), re.MULTILINE | re.DOTALL)
+    found = (pattern.search(_text(file)) for file in files or (Path(str(spec and spec.origin)),))
+    return next((each["function"] or each["group"] for each in found if each), "")
 
 
 def _summary(info: Path) -> str:
@@ -165,17 +166,13 @@ def _text(file: Path) -> str:
 def plugin_command(name: str) -> Any | None:
     """Loads the command of a plug-in; returns None if no distribution registers the name.
 
-    Raises InputError if the command cannot be loaded, several distributions register it, or it belongs to a plug-in of
-    this project that is not installed.
+    Raises InputError if the command cannot be loaded, or several distributions register it.
     """
     from skills.inputs.plugins import PluginDefect, distribution_of, installed_plugins, run_plugin
 
     words, short = name.replace(".", " "), name.rpartition(".")[2]
     found = [entry for entry in installed_plugins(COMMANDS_GROUP) if entry.name == name]
     if not found:
-        if (ours := PLUGIN_COMMANDS.get(name)) is not None:
-            what = f"'{words}' is a command of {ours.distribution}, which is not installed"
-            raise InputError(what, hint=f"pip install {ours.distribution}")
         return None
     if len(found) > 1:
         what = f"{listing(sorted(map(distribution_of, found)))} both have a command '{words}'"
@@ -223,6 +220,9 @@ class _LazyGroup(TyperGroup):
         """Imports and returns the command that the first argument names."""
         with suppress(InputError) if ctx.resilient_parsing else nullcontext():  # a shell completes, and shows no error
             self._load(*[*args, "", ""][:2])
+        if args and args[0] not in self.commands and not args[0].startswith("-") and not ctx.resilient_parsing:
+            near = nearest_name(args[0], self.list_commands(ctx))
+            ctx.fail(f"No such command {one_line(args[0])!r}. {f'Did you mean {near!r}?' if near else _PLUG_INS}")
         return super().resolve_command(ctx, args)
 
     def _load(self, name: str, typed: str) -> None:
@@ -235,14 +235,19 @@ class _LazyGroup(TyperGroup):
         elif name and "." not in name and (found := plugin_command(name)) is not None:
             self.add_command(found, name)
 
-    def invoke(self, ctx: Any) -> Any:
-        """Invokes a command as typer does; bad input ends it with one line, and long messages are shortened."""
+    def main(self, *args: Any, **settings: Any) -> Any:
+        """Runs a command as typer does; bad input ends it with one line."""
         try:
-            return super().invoke(ctx)
+            return super().main(*args, **settings)
         except (InputError, OSError) as error:
             from executive.cli.output import refuse
 
             refuse(error)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Invokes a command as typer does; long messages are shortened."""
+        try:
+            return super().invoke(ctx)
         except typer.BadParameter as error:
             line = one_line(error.message)
             error.message = line if len(line) <= MOST_LETTERS else f"{line[:MOST_LETTERS]}..."

@@ -11,9 +11,10 @@ from typing import Annotated, Any
 import typer
 
 from executive.app.report.run_report import VERDICTS
-from executive.cli.options import AS_JSON, FOXGLOVE, HOST, PORT, QUIET, VIEW, StartCommand, stay_s, takes_request
+from executive.cli.options import AS_JSON, HOST, OBSERVE, PORT, QUIET, VIEW, StartCommand, stay_s, takes_request
 from executive.cli.output import NOT_ACHIEVED, console_for, finish, plain_lines, print_json, progress_bar, show_table
 from executive.mission.request import Request
+from executive.run.control import Control
 from executive.store.missions import STORE, GivenMissions, MissionState, MissionStore, StoredMission, store_in
 from skills.inputs.errors import InputError
 from skills.inputs.outside import is_folder, is_there
@@ -35,18 +36,18 @@ def run(
     view: VIEW = None,
     view_port: PORT = 0,
     view_host: HOST = "127.0.0.1",
-    foxglove: FOXGLOVE = None,
+    observe: OBSERVE = None,
     as_json: AS_JSON = False,
 ) -> None:
     """Runs all queued missions in one world with several robots.
 
     A fault is for the robot that it names ("bob: robot dies at 20 s"), else for all robots.
     """
-    console = console_for(as_json)
-    from executive.view.foxglove import serve_live
+    from executive.app.runs.backend import observers
 
-    store, tell = _store(queue), plain_lines(console)
-    with MissionStore(store, create=False) as missions, missions.claim(), serve_live(foxglove, tell) as live:
+    console, store = console_for(as_json), _store(queue)
+    tell = plain_lines(console)
+    with MissionStore(store, create=False) as missions, missions.claim(), observers(observe) as observing:
         from executive.app.fleet.dispatch import silence
         from executive.app.fleet.fleet_run import run_fleet, simulated_fleet
         from executive.app.runs.folders import new_run
@@ -54,15 +55,13 @@ def run(
 
         if not request.robots:
             raise InputError("a fleet needs its robots", hint="name them, as in --robots alice=spot,bob=spot")
-        queued = _to_do(missions)
-        faults = _faults(request.scenario.faults, [each.name for each in request.robots])
         dispatch = simulated_fleet(
             missions,
-            queued,
+            _to_do(missions),
             request.robots,
             world=request.world,
             seed=request.seed,
-            faults=faults,
+            faults=_faults(request.scenario.faults, [each.name for each in request.robots]),
             tell=silence if quiet else tell,
             record=request.record,
         )
@@ -71,9 +70,11 @@ def run(
         first = next(iter(next(iter(dispatch.missions.values())).options.values()))
         later = queue_function(replace(first.request, robots=request.robots), dispatch.add)
         page = PageView(None, tell, address=(view_host, view_port), later=later) if view is not None else None
-        run_in = partial(run_fleet, dispatch, out=kept.request.out, seed=request.seed, first=first, page=page)
-        with progress_bar(console, "missions", len(dispatch.missions)) as ended:
-            verdict = run_in(live=live, ended=ended, time_limit_s=request.time_limit_s)
+        control = Control(pace=None) if page is None else page.control
+        shown = [*([] if page is None else [page]), *(make(first, control) for make in observing)]
+        run_in = partial(run_fleet, dispatch, out=kept.request.out, seed=request.seed, first=first, visitors=shown)
+        with kept.going_on(), progress_bar(console, "missions", len(dispatch.missions)) as ended:
+            verdict = run_in(control=control, ended=ended, time_limit_s=request.time_limit_s)
         results = dispatch.rows
         left = resumable_lines(missions, queue)
     seen = {each["referee"]["success"] for each in results if each["referee"] is not None}

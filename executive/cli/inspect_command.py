@@ -20,10 +20,10 @@ from executive.cli.options import HOST, PORT, takes_request
 from executive.cli.output import console_for, show_table, terminal_answerer
 from executive.mission.request import Request
 from executive.record.history import RECORDING, Entry, History, read_history, timeline
-from executive.record.schemas import ERRORS
 from executive.tree.node_view import NodeView, node_view, to_json
 from executive.view.formats import to_btcpp, to_mermaid, to_svg
 from executive.view.text import DRAWN_NODES, MANY_NODES, fold_below, fold_to, printable, readable, style_of, to_text
+from executive.words.schemas import ERRORS
 from skills.inputs.errors import InputError
 from skills.inputs.outside import is_file, is_folder, writing
 from skills.quantities import Count, Delay, Tries, Wait

@@ -1,4 +1,4 @@
-"""`errand new` writes an installable package with a skill; plug-ins add packages of other kinds."""
+"""`errand new` writes an installable package with a skill or a task; plug-ins add packages of other kinds."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from skills.inputs.outside import writing
 _SUFFIX: Final = ".template"
 _NAME: Final = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 
-new = typer.Typer(name="new", help="Packages of your own: a skill, or a robot.", rich_markup_mode=None)
+new = typer.Typer(name="new", help="Packages of your own: a skill, a task, or a robot.", rich_markup_mode=None)
 
 
 @new.callback()
 def _group() -> None:
-    """Packages of your own: a skill, or a robot."""
+    """Packages of your own: a skill, a task, or a robot."""
 
 
 @new.command()
@@ -35,6 +35,15 @@ def skill(
     from executive.tree.registry import installed_skills
 
     show_package(render_skill(name, folder, taken=frozenset(installed_skills().names)), folder)
+
+
+@new.command()
+def task(
+    name: Annotated[str, typer.Argument(help="Word of the task: a verb in lower case.")],
+    folder: Annotated[Path, typer.Argument(help="New folder for the package.")],
+) -> None:
+    """Writes an installable package with one task, its test and its registration."""
+    show_package(render_task(name, folder), folder)
 
 
 @dataclass(frozen=True)
@@ -96,6 +105,7 @@ def show_package(written: Collection[Path], folder: Path) -> None:
 
 
 _SKILL: Final = PackageTemplates("skill", Path(__file__).parent / "new/skill")
+_TASK: Final = PackageTemplates("task", Path(__file__).parent / "new/task")
 
 
 def render_skill(name: str, folder: Path, *, taken: frozenset[str] = frozenset()) -> tuple[Path, ...]:
@@ -104,9 +114,43 @@ def render_skill(name: str, folder: Path, *, taken: frozenset[str] = frozenset()
     Raises:
         InputError: the name is not allowed or is taken, or the folder is not empty or cannot be written.
     """
-    _SKILL.check(name, taken)
+    renamed = {"skill.skilltest.yaml": f"{name}.skilltest.yaml", "test_skill.py": f"test_{name}.py"}
+    return _render(_SKILL, name, folder, taken, renamed)
+
+
+def render_task(name: str, folder: Path) -> tuple[Path, ...]:
+    """Writes a package with the task `name` into a new folder; returns the files. Raises InputError like a skill's."""
+    from executive.words.steps import STEP_KEYS
+    from executive.words.task import installed_tasks
+
+    renamed = {"page.py": f"{_TASK.package(name)}.py", "test_task.py": f"test_{name}.py"}
+    taken = frozenset({*installed_tasks(), *STEP_KEYS})
+    if name not in taken and (why := _unsayable(name.replace("_", " "))):
+        raise InputError(f"'{name}' cannot be the name of a task: {why}", hint="choose a verb, as in 'sweep_up'")
+    return _render(_TASK, name, folder, taken, renamed)
+
+
+def _unsayable(spoken: str) -> str | None:
+    """Returns why the words of a new task cannot be said; None if they can."""
+    from executive.app.prepare.worlds import knowledge_of, open_world
+    from executive.language.clauses import cut, trailing_cue
+    from executive.language.parser import load_parser
+    from executive.language.understand import understand
+
+    said, parser, flat = f"{spoken} the kitchen", load_parser(), knowledge_of(open_world("flat"))
+    for sentence in (said, spoken, f"{spoken} every room", f"{spoken} the beer"):
+        if understand(sentence, parser=parser, knowledge=flat, require_wake=False).all_steps:
+            return f"'{sentence}' is a sentence of Errand already"
+    whole = [clause.text for clause in cut(said)] == [said] and trailing_cue(said) is None
+    return None if whole else f"'{said}' is no plain request"
+
+
+def _render(
+    templates: PackageTemplates, name: str, folder: Path, taken: Collection[str], renamed: Mapping[str, str]
+) -> tuple[Path, ...]:
+    templates.check(name, taken)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder} exists and is not empty", hint="name a new folder")
-    words = {"class_name": "".join(word.capitalize() for word in name.split("_"))}
-    renamed = {"skill.skilltest.yaml": f"{name}.skilltest.yaml", "test_skill.py": f"test_{name}.py"}
-    return _SKILL.render(name, folder, words=words, renamed=renamed)
+    spoken = name.replace("_", " ")
+    words = {"class_name": spoken.title().replace(" ", ""), "spoken": spoken}
+    return templates.render(name, folder, words=words, renamed=renamed)

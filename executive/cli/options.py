@@ -12,24 +12,26 @@ from types import NoneType
 from typing import Annotated, Any, Final, get_args
 
 import typer
+from typer._click.shell_completion import CompletionItem
 from typer.core import TyperCommand
 
-from executive.cli.defaults import typed_options, yielding
+from executive.app.prepare.mission_files import shipped_missions
+from executive.cli.defaults import runs_folder, typed_options, yielding
 from executive.cli.number_options import NumberReader, quantity_option
 from executive.mission.request import Request, parse_start
 from executive.mission.request_fields import RequestField, request_fields
 from executive.words.forms import OptionGroup as Group
 from skills.inputs.errors import InputError
+from skills.inputs.plugins import OBSERVERS, installed_plugins
 from skills.quantities import Port, Wait, quantity_of
 from skills.robot import Pose2D
 
 _START: Final = "--start"
-_FOXGLOVE: Final = "--foxglove"
 _VIEW: Final = "--view"
-_FOXGLOVE_ADDRESS: Final = "127.0.0.1:8765"
 _UNTIL_CTRL_C_S: Final = 1e9
 """Value of `--view` alone: the longest wait."""
-_WITH_PORT: Final = re.compile(r"[^\s/=]*:[^\s/=]*")
+_VALUE: Final = re.compile(r"[\d@].*|[^\s/=]*:[^\s/=]*")
+"""Value of an observer's option: a number, or an address."""
 _NUMERIC: Final = re.compile(r"[-+]?(?:\.?\d[\d.,]*(?:e[-+]?\d+)?|nan|inf(?:inity)?)", re.IGNORECASE)
 
 
@@ -77,17 +79,8 @@ ROBOT = Annotated[
         help="Drive a real robot in the map of --world, such as spot://HOST?power_on=yes; needs its plug-in.",
     ),
 ]
-FOXGLOVE = Annotated[
-    str | None,
-    grouped(
-        Group.PAGE,
-        _FOXGLOVE,
-        metavar="[HOST:PORT]",
-        help=f"Serve what the log gets live for Foxglove; by default at {_FOXGLOVE_ADDRESS}.",
-    ),
-]
-_OBSERVED = "Let a plug-in join the run: NAME=VALUE. --ros2 [DOMAIN] joins ROS 2."
-OBSERVE = Annotated[list[str] | None, grouped(Group.PAGE, "--observe", "--ros2", metavar="NAME", help=_OBSERVED)]
+_OBSERVED = "Let an observer join the run: NAME=VALUE, or --NAME [VALUE], as in --foxglove [HOST:PORT] for Foxglove."
+OBSERVE = Annotated[list[str] | None, grouped(Group.PAGE, "--observe", metavar="NAME", help=_OBSERVED)]
 
 
 class StartCommand(TyperCommand):
@@ -130,14 +123,12 @@ def join_values(arguments: Sequence[str]) -> list[str]:
         if word == _START and rest and _NUMERIC.fullmatch(rest[0]):
             numbers = [*takewhile(lambda each: not each.startswith("--"), rest[:3])]
             word, rest = f"{_START}={' '.join(numbers)}", rest[len(numbers) :]
-        elif word == _FOXGLOVE:
-            given = rest and _WITH_PORT.fullmatch(rest[0])
-            word = f"{_FOXGLOVE}={rest.pop(0) if given else _FOXGLOVE_ADDRESS}"
         elif word == _VIEW:
             given = rest and _NUMERIC.fullmatch(rest[0])
             word = f"{_VIEW}={rest.pop(0) if given else _UNTIL_CTRL_C_S}"
-        elif word.partition("=")[0] == "--ros2":
-            word = f"--observe=ros2={word[7:] or (rest.pop(0) if rest and rest[0][:1] in '0123456789@' else '')}"
+        elif installed_plugins(OBSERVERS).select(name=(name := word[2:].partition("=")[0])) and word[:2] == "--":
+            value = word[len(name) + 3 :] or (rest.pop(0) if rest and _VALUE.fullmatch(rest[0]) else "")
+            word = f"--observe={name}={value}"
         words.append(word)
     return words
 
@@ -220,3 +211,29 @@ def _request(typed: Iterable[tuple[RequestField, Any]]) -> Request:
         part = values if not each.part else values.setdefault(each.part, {})
         part[each.name] = _value(each, words)
     return Request(**values)
+
+
+def _worlds() -> Iterable[str]:
+    from plant.worlds.world import known_worlds
+
+    return known_worlds()
+
+
+def _runs() -> list[str]:
+    """Folders of runs, the newest first."""
+    return sorted((str(file.parent) for file in runs_folder().glob("*/run.json")), reverse=True)
+
+
+_NAMES: Final[dict[str, Callable[[], Iterable[str]]]] = {
+    "file": shipped_missions,
+    "files": shipped_missions,
+    "world": _worlds,
+    "run": _runs,
+}
+
+
+def items_of(parameter: str, typed: str) -> list[CompletionItem]:
+    """Completes the value of a parameter, a name or a path, by the parameter's name."""
+    paths = [f"{each}/" if each.is_dir() else str(each) for each in sorted(Path().glob(f"{typed}*")) if typed]
+    names = (name for name in _NAMES[parameter]() if name.startswith(typed))
+    return [CompletionItem(value) for value in dict.fromkeys((*names, *paths))]

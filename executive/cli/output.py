@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import typer
 
-from skills.inputs.errors import InputError
+from skills.inputs.errors import InputError, shortage
 from skills.inputs.outside import LONGEST_ANSWER, LONGEST_TEXT, plain_text, writing
 
 if TYPE_CHECKING:
@@ -112,13 +112,21 @@ def show_table(console: Console, header: Sequence[str], rows: Iterable[Sequence[
 
 
 def refuse(error: InputError | OSError) -> NoReturn:
-    """Ends a command with exit status 2 for bad input, or for a file that cannot be used.
+    """Ends a command with exit status 2 for bad input, a file that cannot be used, or a lack of disk or files.
 
     Prints a line on standard error for each error, and the number of those beyond `_MOST_LINES`. Raises any other
     OSError again.
     """
     if isinstance(error, InputError):
         refused = error
+    elif lack := shortage(error):
+        what = f"{lack}; what this command was writing is lost or incomplete"
+        refused = InputError(what, hint="make room, and give the command again", file=error.filename)
+    elif isinstance(error, FileNotFoundError) and error.filename is None:  # of the working directory
+        refused = InputError("the folder in which it was called is removed", hint="go to another one by cd")
+    elif isinstance(error, FileNotFoundError) and not Path(error.filename).parent.is_dir():
+        what = "its folder was removed while this command used it; what it held is lost"
+        refused = InputError(what, hint="give the command again", file=error.filename)
     elif error.errno not in _OF_NAMES or error.filename is None:
         raise error
     else:
@@ -129,7 +137,7 @@ def refuse(error: InputError | OSError) -> NoReturn:
         typer.echo(f"errand: {each}", err=True)
     if len(every) > _MOST_LINES:
         typer.echo(f"errand: and {len(every) - _MOST_LINES} more; mend these first", err=True)
-    raise typer.Exit(BAD_INPUT) from error
+    raise SystemExit(BAD_INPUT) from error
 
 
 @contextmanager

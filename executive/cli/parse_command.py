@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
@@ -14,7 +16,8 @@ from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.cli.output import BAD_INPUT, print_json
 from executive.language.explain import Use, arcs_svg, explain, explanation_lines, word_uses
 from executive.language.understand import Status, Understanding
-from executive.words.mission import DEFAULT_WORLD
+from executive.words.knowledge import Knowledge
+from executive.words.mission import DEFAULT_WORLD, Mission
 from executive.words.steps import steps_to_yaml
 from skills.inputs.errors import InputError
 from skills.inputs.outside import read_text, writing
@@ -47,7 +50,10 @@ def parse(
     else:
         lines = read_text(file, most_bytes=20_000_000, hint="name a text file in UTF-8").splitlines()
     wake = knowledge is not None and knowledge.robot.require_wake
-    parsed = (executive.parse(line, knowledge=knowledge, require_wake=wake, open_words=open_words) for line in lines)
+    parsed = (
+        _checked(executive.parse(line, knowledge=knowledge, require_wake=wake, open_words=open_words), knowledge)
+        for line in lines
+    )
     if jsonl:
         for meaning in parsed:
             print(json.dumps(_values(meaning, explained), ensure_ascii=False), flush=True)
@@ -66,6 +72,22 @@ def parse(
         print_json(values[0] if file is None else {"sentences": values})
     if any(meaning.status is not Status.OK for meaning in meanings):
         raise typer.Exit(BAD_INPUT)
+
+
+def _checked(meaning: Understanding, knowledge: Knowledge | None) -> Understanding:
+    """Compiles commands with a number, whose limits are those of the plans; returns a refusal as of `errand run`."""
+    said = " ".join((*map(str, meaning.commands), *steps_to_yaml(meaning.steps)))
+    if knowledge is None or not re.search(r"\d", said):
+        return meaning
+    from executive.tree.compiler import compile_mission  # loads Drake
+    from executive.tree.registry import installed_skills
+
+    mission = Mission.from_steps(meaning.all_steps, world=DEFAULT_WORLD, robot=knowledge.robot.name)
+    try:
+        compile_mission(mission, knowledge=knowledge, registry=installed_skills())
+    except InputError as error:
+        return replace(meaning, status=Status.REFUSED, reason=str(error), commands=(), steps=())
+    return meaning
 
 
 def _values(meaning: Understanding, explained: bool) -> dict[str, object]:

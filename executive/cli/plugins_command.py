@@ -9,21 +9,23 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from importlib.metadata import EntryPoint, version
 from multiprocessing import get_context
+from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import Annotated, Final
 
 import typer
 
-from executive.app.runs.backend import OBSERVERS
-from executive.cli.entry import COMMANDS, COMMANDS_GROUP, PLUGIN_COMMANDS, as_command, shipped_command
+from executive.cli.entry import COMMANDS, COMMANDS_GROUP, as_command, shipped_command
 from executive.cli.number_options import quantity_option
 from executive.cli.options import AS_JSON, takes_request
 from executive.cli.output import console_for, finish, progress_bar, show_table
+from executive.language.task_sentences import other_readings, sentence_faults
 from executive.mission.load import load_stack
 from executive.mission.request import Request
 from executive.store import trigger_source
 from executive.tree import registry
 from executive.tree.port_values import describe_type, field_types
+from executive.words.task import installed_tasks, task_of
 from plant.models.catalogue import load_catalogue
 from plant.robots import robot_kind as kinds
 from skills.class_forms import class_forms
@@ -31,7 +33,7 @@ from skills.inputs import plugins as loading
 from skills.inputs.errors import InputError
 from skills.inputs.yaml_source import yaml_of
 from skills.quantities import Duration
-from skills.stack import BACKENDS, DOORS, SLOTS, is_frozen_dataclass, stack_data
+from skills.stack import BACKENDS, DOORS, SLOTS, is_frozen_dataclass, stack_data, stack_file
 
 _WORKERS: Final = 4
 _WORD: Final = re.compile(r"[a-z][a-z0-9_-]*")
@@ -85,21 +87,20 @@ def skills(as_json: AS_JSON = False) -> None:
 
 
 def _rows(found: Sequence[Plugin]) -> Iterator[tuple[str, ...]]:
-    """Yields the rows for the core, for the plug-ins, and for this project's plug-ins that are not installed."""
+    """Yields the rows for the core and for the plug-ins."""
     yield (loading.OURS, version(loading.OURS), "", "", "", "the core")
     last = ""
     for each in sorted(found, key=lambda each: each.distribution):
         named = (each.distribution, each.version) if each.distribution != last else ("", "")
-        yield (*named, each.group, each.name, each.value, each.broken or "can be used")
+        task = installed_tasks().get(each.name) if each.group == loading.TASKS and not each.broken else None
+        used = "can be used" if task is None or not task.samples else f'"{task.samples[0]}"'
+        yield (*named, each.group, each.name, each.value, each.broken or used)
         last = each.distribution
-    missing = {each.distribution for each in PLUGIN_COMMANDS.values()} - {each.distribution for each in found}
-    for name in sorted(missing):
-        yield (name, "", "", "", "", f"not installed: pip install {name}")
 
 
 def groups() -> Sequence[str]:
     """Returns the entry-point groups that Errand reads."""
-    own = (kinds.GROUP, BACKENDS, trigger_source.GROUP, loading.CLASSES, COMMANDS_GROUP, loading.KERNELS, OBSERVERS)
+    own = (kinds.GROUP, BACKENDS, trigger_source.GROUP, COMMANDS_GROUP, *loading.GROUPS)
     return (registry.GROUP, *SLOTS.values(), DOORS, *own)
 
 
@@ -166,6 +167,13 @@ def _load(entry: EntryPoint, limit_s: float) -> None:
         class_forms()
         load_catalogue()
         return
+    if entry.group == loading.TASKS:
+        for fault in (*sentence_faults(task_of(entry)), *other_readings(entry.name)):
+            raise InputError(fault, hint="docs/how-to/own-task.md has the notation")
+        return
+    if entry.group == loading.STACKS:
+        load_stack(stack_file(Path(entry.name)))
+        return
     load = entry.load if entry.group != COMMANDS_GROUP else lambda: as_command(entry.name, entry.load())
     try:
         used = loading.run_plugin(entry, load, limit_s=limit_s)
@@ -175,7 +183,7 @@ def _load(entry: EntryPoint, limit_s: float) -> None:
         raise InputError(f"{entry.value} is no frozen dataclass with a method connect")
     if entry.group == BACKENDS and _SCHEME.fullmatch(entry.name) is None:
         raise InputError(f"'{entry.name}' is no scheme in lower case")
-    if entry.group == loading.KERNELS and not callable(used):
+    if entry.group in loading.FUNCTIONS and not callable(used):
         raise InputError(f"{entry.value} is no function")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from datetime import datetime, timedelta
 from itertools import chain, count
@@ -14,7 +14,7 @@ import typer
 from executive.app.runs.signals import ended_by_signals
 from executive.cli.defaults import runs_folder
 from executive.cli.number_options import quantity_argument, quantity_option
-from executive.cli.options import AS_JSON, FOXGLOVE, HOST, PORT, QUIET, STORE, VIEW, StartCommand, takes_request
+from executive.cli.options import AS_JSON, HOST, OBSERVE, PORT, QUIET, STORE, VIEW, StartCommand, takes_request
 from executive.cli.output import console_for, finish, plain_lines, progress_bar, show_table, terminal_answerer
 from executive.cli.run_command import refuse_unaddressed
 from executive.mission.load import load_stack
@@ -39,6 +39,7 @@ queue = typer.Typer(
 
 Out = Annotated[Path, typer.Option(help="Folder for logs, with a folder for each mission.")]
 RunsOut = Annotated[Path | None, typer.Option("--out", help="Replaces the --out of the missions; 'out' for the store.")]
+NoRecord = Annotated[bool, typer.Option("--no-record", help="Leave no recording and no pictures.")]
 Number = Annotated[
     int, quantity_argument(Count, metavar="NUMBER", help="Number of the mission in `errand queue list`.")
 ]
@@ -132,14 +133,15 @@ def run(
     view: VIEW = None,
     view_port: PORT = 0,
     view_host: HOST = "127.0.0.1",
-    foxglove: FOXGLOVE = None,
+    observe: OBSERVE = None,
+    no_record: NoRecord = False,
     as_json: AS_JSON = False,
 ) -> None:
     """Runs all queued missions, each in the world that the mission before it left."""
     from executive.app.runs.queue import resumable_line
 
     console = console_for(as_json)
-    with _runs(store, out, console, quiet, view, (view_host, view_port), foxglove) as (missions, runs):
+    with _runs(store, out, console, quiet, view, (view_host, view_port), observe, not no_record) as (missions, runs):
         ended = _in_turn(missions, runs, console)
         resumable = resumable_line(missions)
     if ended:
@@ -159,7 +161,8 @@ def _runs(
     quiet: bool,
     view: float | None,
     address: tuple[str, int],
-    foxglove: str | None,
+    observe: Sequence[str] | None,
+    record: bool,
     resumes: bool = False,
 ) -> Iterator[tuple[MissionStore, MissionRuns]]:
     """Claims a store while the block runs; yields the store with the runner for its missions.
@@ -170,14 +173,14 @@ def _runs(
     with MissionStore(store or _store(folder, resumes), create=False) as missions, missions.claim():
         with writing(folder, "name another --out"):
             folder.mkdir(parents=True, exist_ok=True)
+        from executive.app.runs.backend import observers
         from executive.app.runs.queue import MissionRuns
         from executive.cli.screen import ConsoleScreen, page_of
-        from executive.view.foxglove import serve_live
 
         page = None if view is None else page_of(console, address, missions.path, folder)
-        with serve_live(foxglove, plain_lines(console)) as live:
-            screen = ConsoleScreen(console, quiet=quiet, page=page, live=live)
-            yield missions, MissionRuns(missions, screen, ask=terminal_answerer(), out=out)
+        with observers(observe) as observing:
+            screen = ConsoleScreen(console, quiet=quiet, page=page, observing=observing)
+            yield missions, MissionRuns(missions, screen, ask=terminal_answerer(), out=out, record=record)
     screen.stay(view)
 
 
@@ -269,7 +272,8 @@ def serve(
     view: VIEW = None,
     view_port: PORT = 0,
     view_host: HOST = "127.0.0.1",
-    foxglove: FOXGLOVE = None,
+    observe: OBSERVE = None,
+    no_record: NoRecord = False,
     as_json: AS_JSON = False,
 ) -> None:
     """Queues missions at times, on a full battery, calls and messages, and runs them, until Ctrl-C."""
@@ -278,7 +282,7 @@ def serve(
 
     console = console_for(as_json)
     tell = plain_lines(console)
-    with _runs(store, out, console, quiet, view, (view_host, view_port), foxglove) as (missions, runs):
+    with _runs(store, out, console, quiet, view, (view_host, view_port), observe, not no_record) as (missions, runs):
         end = None if for_s is None else missions.now() + timedelta(seconds=min(for_s, _LONGEST_S))
         address = CallAddress(host, port, token)
         with WakeupPipe(missions) as wakeup, Listeners(missions.path, address, tell) as listeners:
@@ -306,11 +310,13 @@ def resume(
     view: VIEW = None,
     view_port: PORT = 0,
     view_host: HOST = "127.0.0.1",
-    foxglove: FOXGLOVE = None,
+    observe: OBSERVE = None,
+    no_record: NoRecord = False,
 ) -> None:
     """Resumes an interrupted or cancelled mission from its last finished step; then runs its queue."""
     console = console_for(as_json)
-    with _runs(store, out, console, quiet, view, (view_host, view_port), foxglove, True) as (missions, runs):
+    address, record = (view_host, view_port), not no_record
+    with _runs(store, out, console, quiet, view, address, observe, record, True) as (missions, runs):
         ended = _in_turn(missions, runs, console, _interrupted(missions, mission))
     values = {**ended[0].to_json(), "then": [each.to_json() for each in ended[1:]]}
     finish(values, as_json, good=all(each.achieved for each in ended))

@@ -14,7 +14,6 @@ import typer
 from executive.cli.options import (
     ANYWAY,
     AS_JSON,
-    FOXGLOVE,
     HOST,
     OBSERVE,
     PORT,
@@ -25,7 +24,7 @@ from executive.cli.options import (
     grouped,
     takes_request,
 )
-from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, terminal_answerer
+from executive.cli.output import NOT_ACHIEVED, console_for, print_json, terminal_answerer
 from executive.mission.request import Request
 from executive.words.forms import OptionGroup as Group
 from skills.inputs.errors import InputError
@@ -36,7 +35,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from executive.app.report.run_report import RunReport
-    from executive.record.work import Profile
+    from executive.app.runs.profile import Profile
 
 
 @takes_request()
@@ -55,33 +54,31 @@ def run(
     view: VIEW = None,
     view_port: PORT = 0,
     view_host: HOST = "127.0.0.1",
-    foxglove: FOXGLOVE = None,
     observe: OBSERVE = None,
     robot: ROBOT = None,
 ) -> None:
     """Runs a sentence or a mission file in the simulated world, or with a real robot."""
     refuse_unaddressed(request)
     from executive.app.prepare.from_request import prepare_checked
-    from executive.app.runs.backend import observer
+    from executive.app.runs.backend import observers
+    from executive.app.runs.profile import Profile
     from executive.app.runs.queue import MissionRuns
     from executive.app.runs.real_robot import real_runner
     from executive.cli.screen import ConsoleScreen, page_of, voice_for
-    from executive.record.work import Profile
     from executive.store.missions import MissionStore, store_in
-    from executive.view.foxglove import serve_live
 
     console = console_for(as_json)
     kept_in = store or store_in(request.out)
-    timing, observing = Profile() if profile else None, [*map(observer, observe or ())]
+    timing = Profile() if profile else None
 
-    with voice_for(aloud) as voice, serve_live(foxglove, plain_lines(console)) as live:
+    with voice_for(aloud) as voice, observers(observe) as observing:
         if listen_to is not None:
             from executive.cli.listen_command import hear_request
 
             request = replace(request, sentence=hear_request(listen_to, request, console=console))
         prepared = prepare_checked(request, ask=terminal_answerer(), anyway=anyway)
         page = None if view is None else page_of(console, (view_host, view_port), kept_in, request.out)
-        screen = ConsoleScreen(console, quiet, whole_tree, voice, page, live, timing, observing)
+        screen = ConsoleScreen(console, quiet, whole_tree, voice, page, timing, observing)
         connection = real_runner(prepared, robot) if robot is not None else nullcontext()
         with writing(request.out, "name another --out"):
             request.out.mkdir(parents=True, exist_ok=True)
@@ -96,7 +93,7 @@ def run(
 
 def _tell(console: Console, timing: Profile | None, report: RunReport | None) -> None:
     """Prints the CPU times, and the report as JSON, if the user asked for them."""
-    from executive.record.work import lines
+    from executive.app.runs.profile import lines
 
     if timing is not None:
         for line in lines(timing.table()):

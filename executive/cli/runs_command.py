@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
+from itertools import repeat
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -38,16 +39,16 @@ def clean(
     out: Out = Path("out"),
     as_json: AS_JSON = False,
 ) -> None:
-    """Removes the folders of older runs; other files stay."""
+    """Removes the folders of older runs; other files and the folders of runs that go on stay."""
     from executive.app.runs.folders import remove_runs
     from executive.store.triggers import Every
 
-    removed = remove_runs(out, Every.from_text(older_than).period, datetime.now().astimezone())
-    for folder in removed:
-        console_for(as_json).print(f"Removed: {folder}", markup=False)
-    if not removed:
+    removed, stay = remove_runs(out, Every.from_text(older_than).period, datetime.now().astimezone())
+    for word, folder in (*zip(repeat("Removed"), removed), *zip(repeat("Stays, because its run goes on"), stay)):
+        console_for(as_json).print(f"{word}: {folder}", markup=False)
+    if not removed and not stay:
         console_for(as_json).print(f"No run in {out} is older.", markup=False)
-    finish({"removed": list(map(str, removed))}, as_json)
+    finish({"removed": list(map(str, removed)), "going_on": list(map(str, stay))}, as_json)
 
 
 def _values(kept: KeptRun) -> dict[str, Any]:

@@ -20,14 +20,13 @@ from rich.text import Text
 from executive.app.prepare.prepared import Prepared
 from executive.app.runs.backend import Observe
 from executive.app.runs.one_run import FinishedRun
+from executive.app.runs.profile import Profile
 from executive.app.runs.queue import RunOptions
 from executive.cli.options import stay_s
 from executive.cli.output import plain_lines
 from executive.cli.run_keys import HELP, Keys, prompt_lines, read_keys
 from executive.language.parser import load_parser
 from executive.record.history import RECORDING
-from executive.record.schemas import SPEECH
-from executive.record.work import Profile
 from executive.run.control import Control
 from executive.run.outcome import RunResult
 from executive.run.visitor import Progress, RunVisitor
@@ -36,10 +35,10 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeState, Snapshot
 from executive.tree.node_view import NodeView, node_view
 from executive.view.text import Styles, printable, style_of, to_rich
+from executive.words.schemas import SPEECH
 
 if TYPE_CHECKING:
     from executive.app.runs.page_view import PageView
-    from executive.view.foxglove import LiveServer
 
 SILENCE: Final = Silence()
 
@@ -103,9 +102,8 @@ def page_of(console: Console, address: tuple[str, int], store: Path, out: Path) 
 class ConsoleScreen:
     """Display and control of runs on the console.
 
-    `page` builds the live page of a run, and `shown_page` is the last page; `live` sends the messages that runs log.
-    With `whole_tree` the console shows all nodes of the tree at the end. `profile` times the subsystems. `observing`
-    adds visitors to each run.
+    `page` builds the live page of a run, and `shown_page` is the last page. With `whole_tree` the console shows all
+    nodes of the tree at the end. `profile` times the subsystems. `observing` adds visitors to each run.
     """
 
     console: Console
@@ -113,7 +111,6 @@ class ConsoleScreen:
     whole_tree: bool = False
     voice: Voice = SILENCE
     page: Callable[[Prepared], PageView] | None = None
-    live: LiveServer | None = None
     profile: Profile | None = None
     observing: Sequence[Observe] = ()
     shown_page: PageView | None = field(default=None, init=False)
@@ -144,7 +141,7 @@ class ConsoleScreen:
             load_parser().release()
             with nullcontext() if self.quiet else live_view(self.console) as view:
                 shown = (speech, *joining) if view is None else (view, speech, *joining)
-                yield RunOptions(control, shown, page, self.live, self.profile)
+                yield RunOptions(control, (*shown, *self._displays()))
             return
         from executive.app.runs.conversations import Conversations, load_ahead  # the grammar of sentences
 
@@ -156,7 +153,12 @@ class ConsoleScreen:
             if control.attended and page is None:
                 load_ahead()
             visitors = (speech, conversations) if view is None else (view, speech, conversations)
-            yield RunOptions(control, (*visitors, *joining), page, self.live, self.profile)
+            yield RunOptions(control, (*visitors, *joining, *self._displays()))
+
+    def _displays(self) -> tuple[RunVisitor, ...]:
+        """Returns the page and the profile, of those that there are."""
+        made = (self.shown_page, self.profile)
+        return tuple(each for each in made if isinstance(each, RunVisitor))
 
     def conclude(self, finished: FinishedRun) -> None:
         """Shows verdicts and figures, after the whole tree if `whole_tree`."""

@@ -11,8 +11,13 @@ from pathlib import Path
 from typing import Final
 
 import typer
+from typer._completion_classes import BashComplete
+from typer.main import get_command
 
-from executive.cli.entry import COMMANDS, app
+from executive.app.prepare.worlds import knowledge_of, open_world
+from executive.cli.defaults import default_map
+from executive.cli.entry import app
+from executive.words.mission import DEFAULT_WORLD
 
 _PROMPT: Final = "errand> "
 _HISTORY: Final = Path(".local") / "state" / "errand" / "history"
@@ -45,7 +50,7 @@ def shell() -> None:
 
 
 def _lines() -> Iterator[str]:
-    """Yields the lines that the user types or pipes in; at a terminal with history and the names of commands."""
+    """Yields the lines that the user types or pipes in; at a terminal with history and completion."""
     if not sys.stdin.isatty():
         yield from sys.stdin
         return
@@ -55,7 +60,10 @@ def _lines() -> Iterator[str]:
     with suppress(OSError):
         readline.read_history_file(file)
     readline.set_history_length(_LONGEST_HISTORY)
-    readline.set_completer(lambda text, number: [*(name for name in COMMANDS if name.startswith(text)), None][number])
+    readline.set_completer_delims(" ")
+    readline.set_completer(
+        lambda text, number: [*words_of_line(readline.get_line_buffer()[: readline.get_begidx()], text), None][number]
+    )
     readline.parse_and_bind("tab: complete")
     try:
         while True:
@@ -67,3 +75,13 @@ def _lines() -> Iterator[str]:
         with suppress(OSError):
             file.parent.mkdir(parents=True, exist_ok=True)
             readline.write_history_file(file)
+
+
+def words_of_line(before: str, typed: str) -> list[str]:
+    """Completes a word of a line in `errand shell`: as other shells do, and after `say` words of the world's names."""
+    words = before.split()
+    if words[:1] != ["say"]:
+        return [each.value for each in BashComplete(get_command(app), {}, "errand", "").get_completions(words, typed)]
+    known = knowledge_of(open_world(default_map(Path()).get("run", {}).get("world", DEFAULT_WORLD)))
+    names = (*known.place_names(), *known.object_names(), *known.people)
+    return sorted({word for name in names for word in name.split() if word.lower().startswith(typed.lower())})

@@ -4,10 +4,12 @@ import enum
 import re
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
 from typing import Final
+
+from py_trees.common import Status as NodeStatus
 
 from executive.conversation.replies import (
     NEVER_MIND,
@@ -29,6 +31,7 @@ from executive.language.followups import (
     Remark,
     amend,
     parse_follow_up,
+    parse_recall,
     parse_remark,
     skip_fetching,
 )
@@ -39,9 +42,8 @@ from executive.run.control import Control
 from executive.run.control_state import Mode
 from executive.run.visitor import Progress, RunVisitor
 from executive.tree.compiler import CompiledTree
-from executive.words.command import Command, Task
+from executive.words.command import Command
 from executive.words.leaf_steps import steps_of_commands
-from executive.words.step import Step
 from executive.words.steps import Group
 from skills.api import ObjectKind
 from skills.inputs.errors import InputError
@@ -52,16 +54,11 @@ REMEMBERED_S: Final = 60.0
 
 @dataclass(frozen=True)
 class _Spoken:
-    """Remembered request: commands, memory for follow-ups, time (s), and the name of the mission that it started.
+    """Remembered request: what it means, the time (s), and the name of the mission that it started."""
 
-    `steps` is the whole mission if the request has conditions, loops, waits or other control flow.
-    """
-
-    commands: tuple[Command, ...]
-    memory: Memory | None
+    meant: Understanding
     at_s: float
     mission: str
-    steps: tuple[Step, ...] = ()
 
 
 class _When(enum.Enum):
@@ -89,6 +86,7 @@ class Conversation(RunVisitor):
         self._open: Waiting | None = None
         self._names: frozenset[str] = frozenset()
         self._seen: frozenset[str] = frozenset()  # missions that have begun
+        self._done: frozenset[str] = frozenset()
         self._remarks = RemarkAnswers(speech, control)
         self._listeners: tuple[Callable[[Waiting | None], None], ...] = ()
 
@@ -101,7 +99,8 @@ class Conversation(RunVisitor):
         with self._lock:
             self._names |= {tree.mission_name}
             steps = tree.steps if any(step.is_block for step in tree.steps) else ()
-            self._last = _Spoken(tree.commands, memory, now_s, tree.mission_name, steps)
+            meant = Understanding("", Status.OK, tree.commands, memory=memory, steps=steps)
+            self._last = _Spoken(meant, now_s, tree.mission_name)
 
     def tick(self, progress: Progress) -> None:
         """Stores the progress of the run."""
@@ -109,6 +108,9 @@ class Conversation(RunVisitor):
         tree = progress.trees.get(self._speech.robot_name)
         if tree is not None:
             self._seen |= {tree.mission_name}
+            states = progress.states[self._speech.robot_name].items()
+            done = {path_id for path_id, node in states if node.status is NodeStatus.SUCCESS}
+            self._done |= {str(each.command) for each in tree.parts if {each.path_id, each.node} & done}
 
     def hear(self, text: str, now_s: float | None = None) -> Reply:
         """Carries out a sentence and returns the reply. `now_s` is the robot's clock, by default that of the run.
@@ -150,7 +152,7 @@ class Conversation(RunVisitor):
             return confirmation(NEVER_MIND)
         if remark is not None:
             return self._remarks.answer_to(remark, text)
-        for step in (self._answer_mission, self._answer_own, self._follow_up):
+        for step in (self._answer_mission, self._answer_own, self._recall, self._follow_up):
             reply = step(text, now_s)
             if reply is not None:
                 return reply
@@ -164,10 +166,8 @@ class Conversation(RunVisitor):
         begun = said.replace(",", " ").split()[:1]  # "yes, I am" begins with the answer
         for each in self._control.state.questions:
             plain = begun[0] if begun and {o.lower() for o in each.options} == {"yes", "no"} else said
-            option = next(
-                (o for n, o in enumerate(each.options, 1) if o.lower() in (said, plain) or said == str(n)), None
-            )
-            chosen = option or (text if not each.options else None)
+            fitting = (o for n, o in enumerate(each.options, 1) if o.lower() in (said, plain) or said == str(n))
+            chosen = next(fitting, None if each.options else text)
             if chosen is not None:
                 return self._tried(partial(self._control.answer, each.id, chosen), f"{chosen}, then")
         return None
@@ -188,6 +188,17 @@ class Conversation(RunVisitor):
         self._open = waiting
         return Reply(ReplyKind.QUESTION, f"I did not understand. {waiting.question.text}", question=waiting.question)
 
+    def _recall(self, text: str, now_s: float) -> Reply | None:
+        """Answers whether this run has done what a sentence asks about; returns None for other sentences."""
+        request = parse_recall(text)
+        if request is None or self._understood(text, now_s).status is Status.OK:
+            return None
+        meant = self._understood(request, now_s)
+        if meant.status is not Status.OK or any(step.is_block for step in meant.all_steps):
+            return refusal(meant.reason or "I know of single steps only whether they are done")
+        asked = {str(command) for step in meant.all_steps for command in step.commands}
+        return answer("yes, I have done that" if asked and asked <= self._done else "no, not so far")
+
     def _waiting(self, now_s: float) -> Waiting | None:
         return self._open if self._open is not None and now_s <= self._open.until_s else None
 
@@ -200,7 +211,9 @@ class Conversation(RunVisitor):
 
     def _understood(self, text: str, now_s: float) -> Understanding:
         last = self._remembered(now_s)
-        return self._speech.understand(text, None if last is None else last.memory or self._memory_of(last.commands))
+        return self._speech.understand(
+            text, None if last is None else last.meant.memory or self._memory_of(last.meant.commands)
+        )
 
     def _memory_of(self, commands: Sequence[Command]) -> Memory | None:
         """Memory for follow-ups to commands from a file, as if a user had said the commands."""
@@ -218,10 +231,10 @@ class Conversation(RunVisitor):
         if re.match(_LATER, text, re.IGNORECASE):
             when = _When.AFTERWARDS
         elif refers and self._can_be_changed(now_s):
-            last = () if self._last is None else self._last.commands
+            last = () if self._last is None else self._last.meant.commands
             before, now = ({each.object or each.item for each in commands} for commands in (last, meant.commands))
             when = _When.INSTEAD if before & now - {None} else when
-        return self._begin_meant(meant, when, now_s)
+        return self._begin(meant, when, now_s)
 
     def _not_ok(self, meant: Understanding, text: str, now_s: float) -> Reply:
         if meant.question is not None:
@@ -236,21 +249,21 @@ class Conversation(RunVisitor):
             return None
         when = _When.AFTERWARDS
         if follow_up.kind is FollowUpKind.AGAIN:
-            return self._begin(last.commands, when, now_s, memory=last.memory, steps=last.steps)
+            return self._begin(last.meant, when, now_s)
         if follow_up.kind is FollowUpKind.CORRECTION:
             when = _When.INSTEAD if self._can_be_changed(now_s) else _When.FIRST
         whole = self._understood(follow_up.whole, now_s)
         if whole.status is Status.OK:
-            return self._begin_meant(whole, when, now_s)
-        if last.steps:
+            return self._begin(whole, when, now_s)
+        if last.meant.steps:
             return refusal("I cannot change a part of what decides, repeats or waits; say it again")
         named = self._named(follow_up, now_s)
         if isinstance(named, Understanding):
             return self._not_ok(named, text, now_s)
-        changed = amend(last.commands, named, self._speech.knowledge)
-        if changed == last.commands:
+        changed = amend(last.meant.commands, named, self._speech.knowledge)
+        if changed == last.meant.commands:
             return refusal(f"I do not see what '{follow_up.whole}' changes")
-        return self._begin(changed, when, now_s)
+        return self._begin(Understanding("", Status.OK, changed), when, now_s)
 
     def _named(self, follow_up: FollowUp, now_s: float) -> Amendment | Understanding:
         """Grounds the names in a short follow-up; returns an Understanding with the reason if that fails."""
@@ -281,24 +294,12 @@ class Conversation(RunVisitor):
 
     # -- missions ----------------------------------------------------------------------------------------------------
 
-    def _begin_meant(self, meant: Understanding, when: _When, now_s: float) -> Reply:
-        return self._begin(meant.commands, when, now_s, notes=meant.notes, memory=meant.memory, steps=meant.steps)
-
-    def _begin(
-        self,
-        commands: Sequence[Command],
-        when: _When,
-        now_s: float,
-        *,
-        notes: Sequence[str] = (),
-        memory: Memory | None = None,
-        steps: tuple[Step, ...] = (),
-    ) -> Reply:
-        """Starts a mission from commands, or from steps that contain them, and remembers it."""
+    def _begin(self, meant: Understanding, when: _When, now_s: float) -> Reply:
+        """Starts a mission from what is understood, and remembers it."""
         state = self._control.state
         if state.mode is Mode.ENDED:
             return refusal(OVER)
-        todo = tuple(commands)
+        todo, steps = meant.commands, meant.steps
         if when is _When.INSTEAD and not steps:
             todo = skip_fetching(todo, self._held(), self._speech.knowledge)
         whole = steps or steps_of_commands(todo)
@@ -313,11 +314,11 @@ class Conversation(RunVisitor):
         still = "; I stand still until you say 'go on'" if mode in (Mode.PAUSED, Mode.STOPPED) else ""
         shown = [inner for step in whole for inner in (step.steps if isinstance(step, Group) else (step,))]
         listed = "; ".join("; ".join(map(str, step.commands)) or step.words for step in shown)
-        text = "; ".join((*notes, f"{when.value}: {listed}{still}"))
+        text = "; ".join((*meant.notes, f"{when.value}: {listed}{still}"))
         reply = self._tried(partial(give, tree), text, todo)
         if reply.kind is ReplyKind.DONE:
             self._names |= {tree.mission_name}
-            self._last = _Spoken(tuple(commands), memory, now_s, tree.mission_name, steps)
+            self._last = _Spoken(replace(meant, notes=()), now_s, tree.mission_name)
         return reply
 
     def _tried(self, act: Callable[[], None], text: str, commands: tuple[Command, ...] = ()) -> Reply:
@@ -338,7 +339,7 @@ class Conversation(RunVisitor):
         missions = self._control.state.missions.get(self._speech.robot_name, ())
         if status is None or not status.holding or self._last is None or self._last.mission not in missions[-1:]:
             return None
-        return next((command.object for command in self._last.commands if command.task is Task.GRASP), None)
+        return next((command.object for command in self._last.meant.commands if command.takes), None)
 
 
 _START: Final = "start"
@@ -349,6 +350,4 @@ _DETERMINED: Final = r"(?:the|a|an|my|your|some|any|this|that|\d+|two|three|four
 _COUNTED: Final = r"(?:\d+|two|three|four|five|six)\b"
 _SOURCES: Final = frozenset({"from", "out of", "off", "in", "on", "at"})
 _NONE_OF_THEM: Final = frozenset({"no", "none", "neither", "none of them", "nothing", "neither of them", "no thanks"})
-_COUNTS: Final = MappingProxyType(
-    {word: number for number, words in {2: ("two", "2"), 3: ("three", "3"), 4: ("four", "4")}.items() for word in words}
-)
+_COUNTS: Final = MappingProxyType({"two": 2, "2": 2, "three": 3, "3": 3, "four": 4, "4": 4})

@@ -12,6 +12,7 @@ from typing import Any, Final
 from executive.language.cleaning import find_address
 from executive.language.lexicon import any_of, lexicon, word_list
 from executive.language.questions import RefusalError
+from executive.language.task_sentences import task_openers
 from executive.language.templates import Match, Page, page, words_of
 from executive.words.robot_config import display_name, find_robot
 from skills.inputs.errors import listing
@@ -56,8 +57,9 @@ class AddressedText:
 @cache
 def _verbs() -> Mapping[str, str]:
     """Returns verbs by their forms: "bring" and "brings" map to "bring"."""
-    bases = {verb[0] for verb in lexicon().verbs} | word_list("verbs_too")
-    forms = {f"{base}{'es' if re.search('(?:s|x|z|ch|sh)$', base) else 's'}": base for base in bases}
+    bases = {verb[0] for verb in lexicon().verbs} | word_list("verbs_too") | task_openers()
+    stems = {base: re.sub("(?<=[^aeiou])y$", "ie", base) for base in bases}
+    forms = {f"{stem}{'es' if re.search('(?:s|x|z|ch|sh|o)$', stem) else 's'}": base for base, stem in stems.items()}
     return {**forms, **lexicon().third_persons, **{base: base for base in bases}}
 
 

@@ -11,11 +11,12 @@ from typing import Final
 from executive.language.addressees import AddressedText, Addressee, addressees
 from executive.language.items import Item
 from executive.language.lexicon import lexicon, word_list
-from executive.language.templates import Match, Words, page, words_of
+from executive.language.task_sentences import task_forms, task_openers
+from executive.language.templates import Match, Page, Words, page, words_of
 from executive.language.tokens import smooth
+from executive.words.task import Part
 
 CLAUSES: Final = page("clauses", asking=tuple(sorted(word_list("openers"), key=len, reverse=True)))
-_REWORDING: Final = page("rewording")
 CHECKS: Final = page("checks")
 
 
@@ -92,8 +93,8 @@ def split(text: str, robots: tuple[str, ...] = ()) -> tuple[Addressee | None, tu
     Raises RefusalError when it is not clear which robots a sentence names, or when it forbids an action.
     """
     listener, parts = addressees(robots).parts(text) if len(robots) > 1 else (None, (AddressedText(None, text),))
-    said = ((part, _REWORDING["parts"].reword(smooth(part.text))) for part in parts)
-    cuts = ((part, cut(_REWORDING["whole"].reword(text, whole=True))) for part, text in said)
+    said = ((part, _rewording()["parts"].reword(smooth(part.text))) for part in parts)
+    cuts = ((part, cut(_rewording()["whole"].reword(text, whole=True))) for part, text in said)
     return listener, tuple(replace(clause, part=part) for part, clauses in cuts for clause in clauses)
 
 
@@ -202,8 +203,14 @@ def end_of_scope(clauses: Sequence[Clause], at: int, *, branch: bool = False, ro
 
 
 @cache
+def _rewording() -> Page:
+    """Templates of other words for the same, with the words of the installed tasks."""
+    return Page("rewording", opener=tuple(task_openers(Part.PERSON)), opener_form=dict(task_forms()) or ())
+
+
+@cache
 def _verbs() -> frozenset[str]:
-    return frozenset({first for first, *_ in lexicon().verbs} | set(CLAUSES.table["openers"]))
+    return frozenset({first for first, *_ in lexicon().verbs} | set(CLAUSES.table["openers"]) | task_openers())
 
 
 _ATTACHED: Final = (Cue.SO, Cue.NOT, Cue.OTHERWISE, Cue.FAILED)

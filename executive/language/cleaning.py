@@ -14,6 +14,7 @@ from typing import Final
 from executive.language.lexicon import read_table, word_list
 from executive.language.spelling import sound_distance
 from executive.language.templates import page
+from executive.words.task import installed_tasks
 
 _APART: Final = re.compile(r" ((?:n't|'(?:m|s|d|re|ve|ll))\b)", re.IGNORECASE)
 _ALLOWED: Final = re.compile(r"[^\w\s,.;:!?'\-]|_")
@@ -70,7 +71,10 @@ def unkept_reason(text: str, lost: str) -> str | None:
     None if no such words are among those that are `lost`, or more others are than the row allows.
     """
     words = {*lost.lower().split()}
-    for row in read_table("unkept.yaml"):
+    tasks = installed_tasks().values()
+    for row in (*read_table("unkept.yaml"), *(row for task in tasks for row in task.unkept)):
+        if row.get("lacks") in {task.owner for task in tasks}:
+            continue
         found = re.search(rf"\b(?:{row['said']})", text, re.IGNORECASE)
         kept = words - {*found[0].lower().split()} if found else words
         if found and kept < words and len(kept) <= int(row.get("most", len(words))):

@@ -9,11 +9,11 @@ from executive.language.lexicon import VerbKind, word_list
 from executive.language.phrases import Phrase
 from executive.language.questions import RefusalError
 from executive.language.roles import HERE, Location
-from executive.words.command import Command, Task
+from executive.words.command import Command
+from executive.words.task import Task, basic
 
 _GOES_FOR: Final = frozenset({VerbKind.FIND, VerbKind.PICK, VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP})
 _TAKES: Final = {*_GOES_FOR, VerbKind.PLACE}
-_ALONE: Final = {VerbKind.WAIT: Task.WAIT, VerbKind.CHARGE: Task.CHARGE}
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,16 @@ class CommandFrame:
     task: Task | None = None
     object: Phrase | None = None
 
+    @property
+    def takes(self) -> bool:
+        """Returns whether the robot takes hold of the object."""
+        return self.task is not None and self.task.takes
+
+    @property
+    def looks(self) -> bool:
+        """Returns whether the robot looks for the object, and answers."""
+        return self.task is not None and self.task.looks
+
 
 def command_frames(actions: Sequence[Action]) -> tuple[CommandFrame, ...]:
     """Converts actions to command frames, in order.
@@ -34,6 +44,7 @@ def command_frames(actions: Sequence[Action]) -> tuple[CommandFrame, ...]:
 
     Raises RefusalError when the destination of an object is missing.
     """
+    alone = {VerbKind.WAIT: basic().wait, VerbKind.CHARGE: basic().charge}
     frames: list[CommandFrame] = []
     held: Phrase | None = None
     joined = _merge(_one_by_one(_merge(_merge(actions, _meet), _join)), _set_down)
@@ -42,17 +53,17 @@ def command_frames(actions: Sequence[Action]) -> tuple[CommandFrame, ...]:
         later = any(other.again and other.target == target for other in joined[index:])
         put_at = next((after.goal for after in joined[index : index + 1] if _puts_down(action, after)), None)
         goal = _goal(action, later)
-        taking = [] if held == target else [CommandFrame(verb, goal=action.source, task=Task.GRASP, object=target)]
+        taking = [] if held == target else [CommandFrame(verb, goal=action.source, task=basic().take, object=target)]
         match action:
             case Action(goal=Location(name=name)) if put_at is not None:
                 going = [] if name == put_at.name else [CommandFrame(verb, goal=goal)]
                 frames, held = [*frames, *taking, *going], target
             case Action(kind=VerbKind.GO | VerbKind.WAIT | VerbKind.CHARGE as kind):
-                frames.append(CommandFrame(verb, goal=goal, task=_ALONE.get(kind), object=action.time))
+                frames.append(CommandFrame(verb, goal=goal, task=alone.get(kind), object=action.time))
             case Action(kind=VerbKind.FIND) if not later:
-                frames.append(CommandFrame(verb, goal=action.source, task=Task.FIND, object=target))
+                frames.append(CommandFrame(verb, goal=action.source, task=basic().look, object=target))
             case Action(kind=VerbKind.PLACE):
-                putting = CommandFrame(verb, item=target, goal=goal, task=Task.PLACE, object=target)
+                putting = CommandFrame(verb, item=target, goal=goal, task=basic().put, object=target)
                 frames, held = [*frames, *(taking if goal is not None else []), putting], None
             case _ if goal is None:
                 frames, held = [*frames, *taking], target
@@ -77,10 +88,10 @@ def _one_in_hand(frames: Sequence[CommandFrame]) -> Iterator[CommandFrame]:
     held: CommandFrame | None = None
     several = False
     for frame in frames:
-        if held is not None and frame.task is Task.GRASP:
+        if held is not None and frame.takes:
             several = True
             yield CommandFrame(held.verb, item=held.object, goal=HERE)
-        held = frame if frame.task is Task.GRASP else held if frame.item is None else None
+        held = frame if frame.takes else held if frame.item is None else None
         yield frame
     if held is not None and (several or (held.object is not None and held.object.count > 1)):
         yield CommandFrame(held.verb, item=held.object, goal=HERE)

@@ -6,9 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from executive.language.task_sentences import task_forms, task_openers
 from executive.language.templates import page
-from executive.words.command import START, Command, Task
+from executive.language.tokens import in_present
+from executive.words.command import START, Command
 from executive.words.knowledge import Knowledge
+from executive.words.task import basic
 from skills.api import ObjectKind
 
 _PAGE: Final = page("followups")
@@ -61,6 +64,12 @@ def parse_follow_up(text: str) -> FollowUp | None:
     return next(follow_ups, None)
 
 
+def parse_recall(text: str) -> str | None:
+    """Request that a question is about: "go to the hall" for "have you been to the hall yet"; None for others."""
+    match = _PAGE["recalled"].fullmatch(text.replace("’", "'").strip())
+    return None if match is None else in_present(match["said"])
+
+
 def amend(commands: Sequence[Command], by: Amendment, knowledge: Knowledge) -> tuple[Command, ...]:
     """Changes an object, a place or a person in commands.
 
@@ -80,11 +89,11 @@ def skip_fetching(commands: Sequence[Command], held: ObjectKind | None, knowledg
     if held is None or not commands:
         return tuple(commands)
     first = commands[0]
-    if first.task is Task.GRASP and first.object == held and len(commands) > 1:
+    if first.takes and first.object == held and len(commands) > 1:
         return tuple(commands[1:])
-    takes = any(command.item is not None or command.task is Task.GRASP for command in commands)
+    takes = any(command.item is not None or command.takes for command in commands)
     usual = next(iter(knowledge.usual_surfaces(held.name)), None) if takes else None
-    back = Command(item=held, goal=usual, task=Task.PLACE, object=held, verb="put back")
+    back = Command(item=held, goal=usual, task=basic().put, object=held, verb="put back")
     return tuple(commands) if usual is None else (back, *commands)
 
 
@@ -97,7 +106,7 @@ def _with_thing(command: Command, by: Amendment, knowledge: Knowledge) -> Comman
         return replace(command, **changed)
     if by.old is not None and by.old not in (old.name, *knowledge.classes(old.name)):
         return command
-    usual = command.task in (Task.GRASP, Task.FIND) and command.goal == knowledge.default_place(command.task, old.name)
+    usual = (command.takes or command.looks) and command.goal == knowledge.default_place(command.task, old.name)
     goal = knowledge.default_place(command.task, by.kind.name) if usual else command.goal
     return replace(command, **{**changed, "goal": goal, **dict.fromkeys(said, by.kind)})
 
@@ -117,7 +126,7 @@ class Remark(enum.Enum):
 
     FREEZE = "freeze"  # stand still at once
     WAIT = "wait"  # pause
-    STOP = "stop"  # end a step that waits for this, such as following; else stand still
+    STOP = "stop"  # end a step that waits for this; else stand still
     ENOUGH = "enough"  # end a step that waits for this
     GO_ON = "go_on"  # go on after a pause or a stop
     CANCEL = "cancel"  # give the mission up
@@ -132,4 +141,7 @@ class Remark(enum.Enum):
 def parse_remark(text: str) -> Remark | None:
     """Parses a whole sentence as a remark; None for any other sentence, such as a request."""
     words = re.sub(r"[^\w\s']", " ", text[:_MOST_LETTERS].replace("’", "'"))
-    return next((remark for remark in Remark if page("remarks")[remark.value].fullmatch(words)), None)
+    forms = page(
+        "remarks", opener=tuple(task_openers()), opener_form=tuple(form for form in task_forms() if form[-3:] == "ing")
+    )
+    return next((remark for remark in Remark if forms[remark.value].fullmatch(words)), None)

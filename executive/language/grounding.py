@@ -16,11 +16,19 @@ from executive.language.limits import check_relation, relation_refusal
 from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser
 from executive.language.phrases import Phrase, SpokenRelation
-from executive.language.questions import ABLE, ClarifyingQuestion, RefusalError, Slot, perhaps_question, which_question
+from executive.language.questions import (
+    ClarifyingQuestion,
+    RefusalError,
+    Slot,
+    abilities,
+    perhaps_question,
+    which_question,
+)
 from executive.language.roles import HERE, Location
 from executive.language.spelling import look_alikes, synonyms_for, synonyms_of
-from executive.words.command import Command, Task
+from executive.words.command import Command
 from executive.words.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge, except_for, split_exceptions
+from executive.words.task import Task, basic
 from skills.api import ObjectKind
 from skills.class_forms import NON, known_attributes
 from skills.inputs.errors import known_names, listing
@@ -30,9 +38,9 @@ from skills.relations import DOOR, ORDERS, ROBOT, Landmark, Relation, RelationKi
 def known_line(knowledge: Knowledge | None) -> str:
     """Abilities of the robot and known names, in one line."""
     if knowledge is None:
-        return ABLE
+        return abilities()
     objects, places = listing(knowledge.object_names()), listing(knowledge.place_names())
-    return f"{ABLE}; known objects: {objects}; known places: {places}"
+    return f"{abilities()}; known objects: {objects}; known places: {places}"
 
 
 def ground(
@@ -50,7 +58,7 @@ def ground(
 def _one_by_one(commands: Sequence[Command], knowledge: Knowledge) -> Iterator[Command]:
     """Yields the commands; several objects for a person are fetched and handed over one by one."""
     match commands:
-        case [Command(task=Task.GRASP, object_count=count) as gets, Command(goal=str(to)) as brings, *rest] if (
+        case [Command(takes=True, object_count=count) as gets, Command(goal=str(to)) as brings, *rest] if (
             count > 1 and brings.item == gets.object and (to == HERE.name or knowledge.person(to) is not None)
         ):
             yield from (replace(gets, object_count=1), replace(brings, item_count=1)) * count
@@ -111,7 +119,7 @@ class _Grounder:
         """If an object is fetched from a room without surfaces, brings it to that room instead."""
         found = list(frames)
         for k, (takes, brings) in enumerate(pairwise(frames)):
-            place, fetched = takes.goal, takes.task is Task.GRASP and brings.item == takes.object
+            place, fetched = takes.goal, takes.takes and brings.item == takes.object
             if fetched and place is not None and place.preposition in ("in", "at", "inside") and brings.goal == HERE:
                 name = self.knowledge.place(place.name)
                 if name is not None and not self.knowledge.surfaces_in(name):
@@ -132,7 +140,8 @@ class _Grounder:
             ):
                 dock = self.knowledge.dock
                 self.notes.append(f"I take 'home' to be {'the dock' if dock else 'here'}")
-                yield Command(task=Task.CHARGE, verb=frame.verb) if dock else Command(goal=HERE.name, verb=frame.verb)
+                home = Command(task=basic().charge) if dock else Command(goal=HERE.name)
+                yield replace(home, verb=frame.verb)
             case _:
                 yield self._command(frame)
 
@@ -155,10 +164,10 @@ class _Grounder:
         """Object of a task with its relations, and its default place if none is given."""
         if goal is None and target.name == EVERYTHING:
             raise RefusalError("everything from where? Name the surface or the room", [target.name])
-        if goal is None and frame.task in _LOOKS:
+        if goal is None and (frame.takes or frame.looks):
             goal = self.knowledge.default_place(frame.task, target.name)
         target = self._described(frame, target, goal)
-        if target.name == ANYTHING and (frame.task is not Task.FIND or frame.goal is None):
+        if target.name == ANYTHING and (not frame.looks or frame.goal is None):
             raise RefusalError(f"which object? Known are {listing(self.knowledge.object_names())}", [target.name])
         surfaces = self.knowledge.surfaces_in
         apart = (each.landmarks[0].name for each in target.relations if each.kind is RelationKind.NOT_AT)
@@ -174,7 +183,7 @@ class _Grounder:
     def _described(self, frame: CommandFrame, target: ObjectKind, place: str | None) -> ObjectKind:
         """Object with the relations that say which one at a place is meant. Raises RefusalError for impossible ones."""
         phrase = frame.object
-        if phrase is None or frame.task not in _LOOKS or not phrase.relations:
+        if phrase is None or not (frame.takes or frame.looks) or not phrase.relations:
             return target
         said, relations = phrase.relations[0].said, self._relations(phrase, "look")
         if self.knowledge.somebody(target.name) or target.name in (ANYTHING, EVERYTHING):
@@ -240,10 +249,12 @@ class _Grounder:
 
     def target(self, phrase: Phrase, task: Task | None) -> ObjectKind:
         """Object of a task: a known object or person, or a duration."""
-        if task is Task.WAIT:
+        if task == basic().wait:
             return ObjectKind(phrase.head.lemma)
-        person = self._sought(phrase) if task is Task.FIND else None
-        return ObjectKind(person) if person else self.object_kind(phrase) if task is Task.FIND else self.taken(phrase)
+        if task is None or not task.looks:
+            return self.taken(phrase)
+        person = self._sought(phrase)
+        return ObjectKind(person) if person else self.object_kind(phrase)
 
     def taken(self, phrase: Phrase) -> ObjectKind:
         """Known class or category that a phrase names; "all the objects" means everything."""
@@ -271,7 +282,7 @@ class _Grounder:
         self, frame: CommandFrame, place: Location, target: ObjectKind | None
     ) -> tuple[str, str | None]:
         """Goal of a frame, if the command supports the preposition; for a person also the place."""
-        looks = frame.task in _LOOKS
+        looks = frame.takes or frame.looks
         if looks and place == HERE:
             raise RefusalError("I take and find objects on surfaces, and people in rooms: name a place", [HERE.name])
         act = "look" if looks else "go" if frame.item is None else "bring"
@@ -281,7 +292,7 @@ class _Grounder:
         if frame.object == CONTENTS and room:
             what = f"I cannot tell whether all of the {goal} is empty; ask whether anybody is in it, or what is in it"
             raise RefusalError(what, [place.text])
-        if target is not None and frame.task is Task.FIND and surface and self.knowledge.somebody(target.name):
+        if target is not None and frame.looks and surface and self.knowledge.somebody(target.name):
             raise RefusalError(f"I look for people in rooms, and the {goal} is none", [goal])
         kind = "room" if room else "surface" if surface or goal in self.knowledge.poses else "person"
         check_relation(act, [kind], place)
@@ -429,4 +440,3 @@ def _last(name: str) -> str:
 
 _BIN: Final = "bin"
 _HOME: Final = "home"
-_LOOKS: Final = (Task.GRASP, Task.FIND)

@@ -42,7 +42,11 @@ class PrepositionRole(enum.Enum):
 @cache
 def read_table(name: str) -> Any:
     """Reads a table in this package; all scalars are text, even "on" and "no"."""
-    text = resources.files(__package__).joinpath("tables", name).read_text(encoding="utf-8")
+    return plain_yaml(resources.files(__package__).joinpath("tables", name).read_text(encoding="utf-8"))
+
+
+def plain_yaml(text: str) -> Any:
+    """Reads the text of a table like this package's own; all scalars are text."""
     return yaml.load(text, Loader=getattr(yaml, "CBaseLoader", yaml.BaseLoader))
 
 

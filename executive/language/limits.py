@@ -10,7 +10,7 @@ from executive.language.items import Item, Outside, Predicate, Verb, chunks, spo
 from executive.language.lexicon import PrepositionRole, VerbKind, lexicon, read_table, word_list
 from executive.language.nouns import NounKind, noun_examples
 from executive.language.phrases import Phrase
-from executive.language.questions import ABLE, RefusalError, RefusalKind
+from executive.language.questions import RefusalError, RefusalKind, abilities
 from executive.language.roles import HERE, Location
 from executive.words.knowledge import Knowledge
 from skills.inputs.errors import listing
@@ -25,7 +25,9 @@ def check_feasible(actions: Sequence[Action], knowledge: Knowledge | None) -> No
     """
     for reason, find in _REFUSED.items():
         if said := [*filter(None, chain(*map(find, actions)))]:
-            raise RefusalError(reason.format(quoted=listing(map(repr, said)), said=", ".join(said)), said)
+            raise RefusalError(
+                reason.format(quoted=listing(map(repr, said)), said=", ".join(said), able=abilities()), said
+            )
     actions = actions if knowledge is None else [*_unbound(actions)]
     moved = [target for action in actions for target in action.objects[:1] if _moved(action, target)]
     outside = [(part, part) for action in actions for part in _outside(action, action.target in moved)]
@@ -40,7 +42,7 @@ _REFUSED: Final[Mapping[str, Callable[[Action], Iterable[str | None]]]] = {
     "I bring objects to one person at a time, not to {said}; name one": lambda action: (
         phrase.spoken for _, phrase in _carried(action) if phrase is not None and phrase.universal
     ),
-    f"I cannot carry people: {{said}}; {ABLE}": lambda action: (
+    "I cannot carry people: {said}; {able}": lambda action: (
         f"{action.verb} {target.text}" for target, _ in _carried(action) if target.person
     ),
 }
@@ -61,7 +63,7 @@ def not_understood(parts: Sequence[tuple[str, str]], knowledge: Knowledge | None
         quoted = ", ".join(map(repr, words))
         named.append(quoted if not clause or clause in words else f"{quoted} in {clause!r}")
     postures = sorted({word for part, _ in parts for word in word_list("postures") & {*part.split()}})
-    reason = f"I do not understand {', '.join(named)}; {ABLE}"
+    reason = f"I do not understand {', '.join(named)}; {abilities()}"
     if postures:
         reason = f"I see where people are, but not whether they are {listing(postures, last='or')}"
     return RefusalError(reason, [part for part, _ in parts], kind=RefusalKind.NOT_UNDERSTOOD)

@@ -15,7 +15,7 @@ from executive.language.limits import check_feasible, check_routes_and_speaker, 
 from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser
 from executive.language.phrases import Phrase, noun_phrases
-from executive.language.questions import ABLE, RefusalError, RefusalKind, Slot, which_question
+from executive.language.questions import RefusalError, RefusalKind, Slot, abilities, which_question
 from executive.language.reading import Reader
 from executive.language.reference import Memory, resolve
 from executive.language.roles import Location, prepositions, relate
@@ -105,7 +105,7 @@ class Pipeline:
         clauses = predicates(trace.items)
         if not clauses:
             what = f"{trace.text!r} asks for nothing" if trace.text else "nothing was said"
-            raise RefusalError(f"{what}; {ABLE}")
+            raise RefusalError(f"{what}; {abilities()}")
         refuse_harm(clauses)
         return replace(trace, clauses=clauses if self.knowledge else drop_name(clauses))
 
@@ -154,7 +154,7 @@ _NOT_MEANT: Final = "I take {} not to be meant"
 def _nothing_to_do(actions: Sequence[Action]) -> RefusalError:
     names = [phrase.text for action in actions for phrase in action.objects]
     of = f" of {listing(names)}" if names else ""
-    return RefusalError(f"nothing to do was said{of}; {ABLE}", names, kind=RefusalKind.NOTHING_TO_DO)
+    return RefusalError(f"nothing to do was said{of}; {abilities()}", names, kind=RefusalKind.NOTHING_TO_DO)
 
 
 def _chosen(choice: Sequence[Phrase], kind: VerbKind | None, tokens: Sequence[Token]) -> str:

@@ -8,9 +8,9 @@ from typing import Any, Final
 
 from executive.language.lexicon import word_list
 from executive.words.mission import QuestionPolicy
+from executive.words.task import installed_tasks
 from skills.inputs.errors import listing
 
-ABLE: Final = "I can fetch, take, put and find objects, go to places, follow and guide people, wait and charge"
 ALIKE_SOUND: Final = 0.2
 _LONG_WORD: Final = re.compile(r"(\S{40})\S{20,}")
 _PREPOSITION: Final = r"(?:to|into|onto|in|on|at|from|near|next to|beside|under|behind|here|there)"
@@ -22,6 +22,15 @@ _FILLERS: Final = re.compile(
 _LEADING: Final = re.compile(rf"^(?:{_PREPOSITION}\s+)?(?:(?:the|a|an|my)\s+)?(?=\w)", re.IGNORECASE)
 _THERE: Final = "there"
 _ORDINALS: Final = ("first", "second", "third", "fourth", "fifth")
+
+
+def abilities() -> str:
+    """Sentence that says what the robot does, with the tasks of plug-ins."""
+    from executive.language.task_sentences import spoken_tasks  # answers alone need no templates
+
+    spoken = spoken_tasks()
+    more = [task.ability or task.word for task in installed_tasks().values() if task.ability or task in spoken]
+    return f"I can fetch, take, put and find objects, {', '.join(('go to places', *more, 'wait'))} and charge"
 
 
 class Slot(Enum):
@@ -104,7 +113,8 @@ def insert_answer(sentence: str, question: ClarifyingQuestion, answer: str) -> s
     """Inserts the answer into the sentence: the candidate that it means, otherwise the answer's own words."""
     value = chosen_candidate(question, answer) or _FILLERS.sub("", answer).strip(" ,.!?")
     if question.heard is None:
-        return f"{sentence.rstrip(' .,!?')} {_whereto(value)}"
+        said = _whereto(value) if question.slot is Slot.GOAL else re.sub(rf"^{_PREPOSITION} ", "", value)
+        return f"{sentence.rstrip(' .,!?')} {said}"
     heard, pronouns = question.heard.lower(), word_list("pronouns") | word_list("somebody")
     full = _whereto(value) if heard == _THERE else _definite(value) if heard in pronouns else _LEADING.sub("", value)
     longer = tuple(c.lower() for c in question.candidates if len(c) > len(heard))

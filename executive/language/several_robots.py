@@ -20,7 +20,6 @@ from executive.language.roles import Location
 from executive.language.spelling import CorrectedText, correct_spelling
 from executive.language.understand import Part, Status, Understanding, look_again, meaning, under_rules, understand
 from executive.language.zone_rules import read_rules
-from executive.words.command import Task
 from executive.words.knowledge import Knowledge
 from executive.words.robot_config import display_name, find_robot
 from skills.inputs.errors import listing
@@ -173,7 +172,7 @@ class _Reader:
             return
         last = carried[-1]
         put_down = last.goal is not None and self.knowledge.place(last.goal) is not None
-        if put_down if last.item else last.task not in (None, Task.GRASP):
+        if put_down if last.item else last.task is not None and not last.takes:
             return
         what = f"{self._named(who)} cannot take the {last.item or last.object} then"
         raise RefusalError(f"{what}; say on which table the other robot puts it", [str(last.item or last.object)])
@@ -181,7 +180,7 @@ class _Reader:
     def _check_one_thing(self, part: AddressedText, meant: Understanding) -> None:
         """Refuses to send several robots for one single object. Raises RefusalError."""
         several = part.who is RobotChoice.ALL or len(named_robots(part.who)) > 1
-        takes = any(command.task is Task.GRASP for command in meant.commands)
+        takes = any(command.takes for command in meant.commands)
         single = [target.text for _, target in _definite(meant) if not target.plural]
         if several and takes and single:
             what = f"{self._named(part.who)} cannot all take the one {single[0]}; say which of them"
@@ -231,7 +230,7 @@ def _definite(meant: Understanding) -> list[tuple[Action, Phrase]]:
 def _takes_put(before: Understanding, meant: Understanding) -> bool:
     """Returns whether `meant` takes an object from where it was put before."""
     put = {(str(one.item), one.goal) for one in before.commands if one.item is not None}
-    return any((str(one.object), one.goal) in put for one in meant.commands if one.task is Task.GRASP)
+    return any((str(one.object), one.goal) in put for one in meant.commands if one.takes)
 
 
 def _moved(before: Understanding, meant: Understanding) -> Location | None:

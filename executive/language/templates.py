@@ -15,9 +15,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
 from itertools import product
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
-from executive.language.lexicon import lexicon, read_table
+from executive.language.lexicon import lexicon, plain_yaml, read_table
 
 
 class Words:
@@ -68,23 +70,45 @@ class Match:
 
 
 class Page:
-    """Templates of a page by intent; `lists` has the words of slots that the page leaves open."""
+    """Templates of a page by intent; `lists` has the words of slots that the page leaves open.
 
-    def __init__(self, name: str, **lists: tuple[str, ...]) -> None:
-        self._name, self._given = name, lists
+    The page is in a `file`, or this package's own. `more` are intents, and `rules`, that code brings beside its own.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        file: Path | None = None,
+        more: Mapping[str, Any] = MappingProxyType({}),
+        rules: Mapping[str, Any] = MappingProxyType({}),
+        **lists: tuple[str, ...] | dict[str, str],
+    ) -> None:
+        self._name, self._file, self._given, self._more, self._rules = name, file, lists, more, rules
         self._templates, self._parts = dict[str, Template](), dict[str, _Part]()
 
     @cached_property
     def table(self) -> Mapping[str, Any]:
         """Contents of the page, with the common rules and lists, and the words that are given."""
-        own, common = read_table(f"intents/{self._name}.yaml"), read_table("intents/common.yaml")
+        own = (
+            read_table(f"intents/{self._name}.yaml")
+            if self._file is None
+            else plain_yaml(self._file.read_text("utf-8"))
+        )
+        common = read_table("intents/common.yaml")
         lists = {**common["lists"], **own.get("lists", {}), **self._given}
-        return {**own, "rules": {**common["rules"], **own.get("rules", {})}, "lists": lists}
+        rules = {**common["rules"], **own.get("rules", {}), **self._rules}
+        return {**own, "rules": rules, "lists": lists, "intents": {**own["intents"], **self._more}}
 
     def __getitem__(self, intent: str) -> Template:
         if intent not in self._templates:
             self._templates[intent] = Template(self, self.table["intents"][intent])
         return self._templates[intent]
+
+    def first_words(self, intent: str) -> frozenset[str]:
+        """Words with which the templates of an intent begin; none of one that any word may begin."""
+        parts = (self.part(row["template"]) for row in self.table["intents"][intent])
+        return frozenset(word for part in parts for word in part.first or ())
 
     def part(self, values: str | Iterable[str]) -> _Part:
         """Part for a template, or for one of several; each is parsed once."""

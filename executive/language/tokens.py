@@ -16,6 +16,7 @@ from pydantic import TypeAdapter
 from executive.language.amounts import parse_seconds
 from executive.language.lexicon import any_of, expression, lexicon, read_table
 from executive.language.nouns import NounKind
+from executive.language.task_sentences import task_forms, task_openers, timed_openers, verb_forms
 from executive.words.command import is_attribute, may_be_attribute
 from executive.words.knowledge import Knowledge
 from skills.class_forms import NON, known_attributes
@@ -215,7 +216,7 @@ def _rewritten(text: str, families: tuple[str, ...] | None) -> str:
     """Applies the rules of some families, or of all."""
     for rule in _rules(families):
         text = rule.rewrite(text)
-    return " ".join(text.split()).strip(" ,;:-.")
+    return re.sub(r"^(?:[ ,;:.]|-(?! ?\d))+", "", " ".join(text.split()).rstrip(" ,;:-."))
 
 
 @cache
@@ -233,10 +234,31 @@ def _filled(pattern: str) -> str:
 @cache
 def _phrases(name: str) -> str:
     parts = read_table("rephrasing.yaml")["parts"]
+    given = {
+        "verbs": (first for first, *rest in lexicon().verbs if not rest),
+        "tasks": task_openers(),
+        "timed_tasks": timed_openers(),
+        "acts": _acts(),
+    }
     if name in parts:
-        return _filled(expression(parts[name]))
-    verbs = (first for first, *rest in lexicon().verbs if not rest)
-    return any_of(verbs if name == "verbs" else read_table("words.yaml")[name])
+        said = _filled(expression(parts[name]))
+    else:
+        said = any_of(given[name] if name in given else read_table("words.yaml")[name]) or "(?!)"
+    own = any_of(timed_openers()) if name in ("verbs", "handles") else ""
+    return f"(?:{said}|{own})" if own else said
+
+
+@cache
+def _acts() -> Mapping[str, str]:
+    """Acts before and after which something is done, by their forms."""
+    return {**task_forms(), **read_table("words.yaml")["acts"]}
+
+
+def in_present(text: str) -> str:
+    """Replaces a past form at the beginning of a text by its verb: "gone to the hall" becomes "go to the hall"."""
+    first, _, rest = text.partition(" ")
+    forms = {**verb_forms(verb for verb, *_ in lexicon().verbs), **_acts()}
+    return f"{forms.get(first.lower(), first)} {rest}"
 
 
 def _break(match: re.Match[str]) -> str:
@@ -252,7 +274,7 @@ def _each(match: re.Match[str]) -> str:
 
 def _order(match: re.Match[str]) -> str:
     """Says two acts in their order: "after taking the coke, go home" is "take the coke, then go home"."""
-    act = f"{read_table('words.yaml')['acts'][match['act'].lower()]}{match['one']}"
+    act = f"{_acts()[match['act'].lower()]}{match['one']}"
     first, then = (match["other"], act) if match["mark"].lower() == "before" else (act, match["other"])
     return f"{first}, then {then}"
 

@@ -70,10 +70,14 @@ class Understanding:
         """Kind of the refusal; None if there is no refusal, or the sentence is for another robot."""
         return None if self.trace is None or self.trace.refusal is None else self.trace.refusal.kind
 
+    def __str__(self) -> str:
+        """Returns the commands, one a line, or the reason why there are none."""
+        meant = steps_to_yaml(self.steps) or map(str, self.commands)
+        return "\n".join([*meant, *self.notes, *filter(None, [self.reason])])
+
     def _repr_html_(self) -> str:
-        """Returns the commands, or the reason why there are none."""
-        lines = [*map(str, self.commands), *steps_to_yaml(self.steps), *self.notes, *filter(None, [self.reason])]
-        return "".join(f"<p>{escape(line)}</p>" for line in lines)
+        """Returns the same lines for a notebook."""
+        return "".join(f"<p>{escape(line)}</p>" for line in str(self).splitlines())
 
     def to_json(self) -> dict[str, Any]:
         """Returns the answer as JSON values."""

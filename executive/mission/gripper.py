@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Final
 
-from executive.words.command import Command, Task
+from executive.words.command import Command
 from executive.words.knowledge import Knowledge
 from skills.api import ObjectKind
 
@@ -41,9 +41,9 @@ def held_after_either(*held: InGripper | None) -> InGripper:
 
 def held_after(command: Command, held: InGripper | None, knowledge: Knowledge) -> InGripper | None:
     """Object in the gripper after a command that succeeded; None if the gripper is empty."""
-    if command.task is Task.GRASP:
+    if command.takes:
         return held if is_same(held, command.object, knowledge) else InGripper(command.object)
-    return held if _carried(command) is None else None
+    return held if command.carried is None else None
 
 
 def is_same(held: InGripper | None, item: ObjectKind | None, knowledge: Knowledge) -> bool:
@@ -55,11 +55,11 @@ def is_same(held: InGripper | None, item: ObjectKind | None, knowledge: Knowledg
 
 def objection(command: Command, held: InGripper | None, knowledge: Knowledge) -> tuple[str, str] | None:
     """Reason why a command is impossible with this object in the gripper, and a hint; None if it is possible."""
-    if command.task is Task.GRASP:
+    if command.takes:
         if held is None or not held.sure or is_same(held, command.object, knowledge):
             return None
         return grasp_objection(held, f"the {command.object}")
-    carried = _carried(command)
+    carried = command.carried
     if carried is None:
         return None
     if held is None:
@@ -72,11 +72,6 @@ def objection(command: Command, held: InGripper | None, knowledge: Knowledge) ->
 def grasp_objection(held: InGripper, what: str) -> tuple[str, str]:
     """Reason why nothing else can be grasped while an object is held, and a hint."""
     return f"{what} cannot be grasped: the gripper holds {held} then", f"put {held} down before"
-
-
-def _carried(command: Command) -> ObjectKind | None:
-    """Object that a command carries; None if it carries none."""
-    return command.object if command.task is Task.PLACE and command.item is None else command.item
 
 
 def _fits(held: InGripper, item: ObjectKind | None, knowledge: Knowledge) -> bool:

@@ -15,10 +15,9 @@ from executive.words.mission import Mission, Route, Stop
 from executive.words.outlines import Corner
 from executive.words.step import Place, Step
 from skills.inputs.errors import Problems, suggestion
-from skills.inputs.outside import is_file, is_there
 from skills.inputs.schema import validate
 from skills.inputs.yaml_source import KeyPath, YamlSource, parse_yaml, read_yaml
-from skills.stack import DEFAULT_FILE, RobotStack, StackError, default_stack, stack_of
+from skills.stack import RobotStack, StackError, default_stack, stack_of
 
 _NONE_GIVEN: Final[Given] = MappingProxyType({})
 _KEY: Final = "knowledge"
@@ -124,18 +123,12 @@ def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any
     return {**below, **both}
 
 
-def stack_file(given: Path) -> Path:
-    """Path of a stack file: the given path, or the shipped file with that name."""
-    own = DEFAULT_FILE.with_name(f"{given.name}_stack.yaml")
-    return own if given == Path(given.name) and not is_there(given) and is_file(own) else given
-
-
 def load_stack(path: Path | None) -> RobotStack:
     """Reads the stack in a file, or the default stack. Raises InputError with file and line when the file is wrong."""
     if path is None:
         return default_stack()
     source = read_yaml(path)
     try:
-        return stack_of(source.data or {}, path.parent)
+        return stack_of({} if source.data is None else source.data, path.parent)
     except StackError as error:
         raise source.error(error.path, str(error), error.hint) from error

@@ -45,13 +45,15 @@ def parse_values(settings: Iterable[str]) -> dict[str, Any]:
         plain_text(setting, what=f"--set {name[:40]}")
         try:
             value = scalar_of(text)
-        except (yaml.YAMLError, ValueError, RecursionError):
+        except (yaml.YAMLError, ValueError):
             value = None
         if isinstance(value, int | float) and not abs(value) <= LARGEST:
             raise InputError(f"--set {name[:40]}: its number is too large", hint="give a smaller one")
         if not equals or not _can_be_given(name, value):
             hint = "give a name, =, and a text, a number, true or false"
             raise InputError(f"--set {setting[:60]}: it is not NAME=VALUE", hint=hint)
+        if name in values:
+            raise InputError(f"--set {name[:40]} is given twice", hint="give it once")
         values[name] = value
     return values
 

@@ -55,7 +55,7 @@ def _given(settings: list[str]) -> Mapping[str, Any]:
 
 
 def _stack_file(path: Path) -> Path:
-    from executive.mission.load import stack_file
+    from skills.stack import stack_file
 
     return stack_file(path)
 
@@ -176,7 +176,7 @@ class Request:
     stack: Annotated[
         Path | None,
         Option(
-            "A stack file: localiser, planners and so on; see errand stack show. 'no_map': for unknown places.",
+            "A stack file, or the name of a plug-in's: localiser, planners and so on; see errand stack show.",
             read=_stack_file,
             typed=Path,
             group=Heading.ROBOTS,

@@ -16,7 +16,7 @@ from executive.mission.certainty import refuse_certain, refuse_certain_compariso
 from executive.mission.load import load_mission, locate
 from executive.mission.parameters import round_source
 from executive.mission.world_names import in_world_names, unknown_names
-from executive.words.command import START, Command, Task
+from executive.words.command import START, Command
 from executive.words.condition import CONDITIONS, RANGES, Condition, DoorOpen, Look, LookFor, Question, ValueIs
 from executive.words.expression import Expression, ExpressionError, Value, literal
 from executive.words.knowledge import ANYBODY, Knowledge
@@ -222,7 +222,7 @@ class _Resolver:
                 _refuse_decided(error, condition.text, path)
             case Question(look=question):
                 commands = self._meaning(error, (*path, "look"), question).commands
-                if len(commands) != 1 or commands[0].task is not Task.FIND:
+                if len(commands) != 1 or not commands[0].looks:
                     hint = "ask one thing, as in 'is there a hammer in the workshop'"
                     raise error((*path, "look"), f"'{question}' is no single question that a look can answer", hint)
                 return Look.from_command(commands[0], condition.max_age_s)

@@ -3,8 +3,9 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from executive.words.command import PEOPLE_TASKS, SPEAKER, START, TIME_UNITS_S, Command, Task
+from executive.words.command import SPEAKER, START, TIME_UNITS_S, Command
 from executive.words.knowledge import ANYBODY, EVERYTHING, Knowledge
+from executive.words.task import Part, basic
 from skills.api import ObjectKind
 from skills.inputs.errors import listing, suggestion
 from skills.relations import DOOR, ROBOT, Landmark, Relation, RelationKind
@@ -16,12 +17,11 @@ def unknown_names(command: Command, knowledge: Knowledge) -> Iterator[tuple[str,
     def unknown(kind: str, name: str, known: Sequence[str]) -> tuple[str, str]:
         return f"unknown {kind} {name!r}", suggestion(name, knowledge.spellings(known), shown=known)
 
-    waits = command.task is Task.WAIT and command.object is not None and command.object.name in TIME_UNITS_S
-    on_people = command.task in PEOPLE_TASKS and command.object is not None
-    if on_people:
-        yield from _wrong_with_people(command, knowledge)
-    for key, item in (("take", command.item), ("object", None if waits or on_people else command.object)):
-        person = command.task is Task.FIND and item is not None and knowledge.somebody(item.name) is not None
+    waits = command.task == basic().wait and command.object is not None and command.object.name in TIME_UNITS_S
+    own = command.task is not None and command.task.object_is in (Part.PERSON, Part.NUMBER, Part.TEXT)
+    yield from _wrong_with_task(command, knowledge)
+    for key, item in (("take", command.item), ("object", None if waits or own else command.object)):
+        person = command.looks and item is not None and knowledge.somebody(item.name) is not None
         if item is not None and knowledge.object_name(item.name) is None and not person:
             yield key, *unknown("object", item.name, knowledge.object_names())
     goals = (*knowledge.place_names(), *knowledge.people, START)
@@ -38,7 +38,7 @@ def _wrong_relations(command: Command, knowledge: Knowledge) -> Iterator[tuple[s
     for key, item in objects.items():
         if item and item.relations and (knowledge.somebody(item.name) or item.name == EVERYTHING):
             yield key, f"it cannot tell who or what is {item.relations[0]}", "name one kind of object"
-    if command.goal_relations and command.item is None and command.task is not Task.PLACE:
+    if command.goal_relations and command.item is None and not command.puts:
         yield "to", f"nothing is put down {command.goal_relations[0]}", "say what to put there under 'take'"
     if any(each.kind is RelationKind.NOT_AT for each in command.goal_relations):
         yield "to", f"a spot is not {command.goal_relations[0]}", "name the surface on which to put it"
@@ -58,20 +58,23 @@ def _wrong_relations(command: Command, knowledge: Knowledge) -> Iterator[tuple[s
                 yield key, f"unknown {what} {name!r}", suggestion(name, knowledge.spellings(known), shown=known)
 
 
-def _wrong_with_people(command: Command, knowledge: Knowledge) -> Iterator[tuple[str, str, str]]:
-    """Yields the faults in a command to follow, guide or greet people: the command's key, a sentence and a hint."""
-    whom = command.object
-    assert command.task is not None and whom is not None
-    if whom.name != SPEAKER and (whom.attributes or knowledge.somebody(whom.name) is None):
+def _wrong_with_task(command: Command, knowledge: Knowledge) -> Iterator[tuple[str, str, str]]:
+    """Yields what a command's task does not allow: the command's key, a sentence and a hint."""
+    whom, task = command.object, command.task
+    if task is None:
+        return
+    person = whom if task.object_is is Part.PERSON else None
+    if person and person.name != SPEAKER and (person.attributes or knowledge.somebody(person.name) is None):
         known = (ANYBODY, SPEAKER, *knowledge.people)
-        yield "object", f"unknown person {str(whom)!r}", suggestion(whom.name, known, shown=known)
-    if command.item is not None:
+        yield "object", f"unknown person {str(person)!r}", suggestion(person.name, known, shown=known)
+    if command.item is not None and task.item_is is Part.NOTHING:
         hint = "take it there in a step of its own"
-        yield "take", f"the {command.item} cannot be taken along by '{command.task.value}'", hint
-    if command.task is not Task.GREET and command.object_count != 1:
-        yield "object", f"it cannot {command.task.value} several people at a time", "name one person"
-    if command.task is Task.GUIDE and command.goal is None:
-        yield "object", f"it is not said where to guide {whom}", "name the place under 'to'"
+        yield "take", f"the {command.item} cannot be taken along by '{task.word}'", hint
+    if person is not None and not task.several and command.object_count != 1:
+        yield "object", f"it cannot {task.word} several people at a time", "name one person"
+    if task.needs_goal and command.goal is None:
+        what = task.word if whom is None else f"{task.word} {whom}"
+        yield "do" if whom is None else "object", f"it is not said where to {what}", "name the place under 'to'"
 
 
 def in_world_names(command: Command, knowledge: Knowledge) -> Command:

@@ -13,9 +13,10 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-from executive.record.schemas import RUN, TASK
-from executive.words.command import START, Command, Task
+from executive.words.command import START, Command
 from executive.words.knowledge import Knowledge
+from executive.words.schemas import RUN, TASK
+from executive.words.task import Task
 from skills.api import ObjectKind, Publish
 from skills.class_forms import class_form
 from skills.grid_map import GridMap
@@ -80,8 +81,8 @@ def _task_message(command: Command, knowledge: Knowledge) -> Mapping[str, Any]:
 
 
 def command_type(task: Task | None) -> int:
-    """Number of a task: 0 for Nothing, else its place in the list of tasks, counted from 1."""
-    return 0 if task is None else [*Task].index(task) + 1
+    """Number of a task: 0 for Nothing, else 255 for one of a plug-in that has none."""
+    return 0 if task is None else task.number
 
 
 def goal_position(knowledge: Knowledge, command: Command) -> tuple[float, float]:
@@ -108,11 +109,15 @@ def versions(packages: Sequence[str]) -> dict[str, str]:
 
 
 def map_message(grid: GridMap, knowledge: Knowledge, *, world: str) -> Mapping[str, Any]:
-    """Encodes the map: a grey PNG (first row: largest y), its origin in the world (m), the places, the dock."""
+    """Encodes the map: a grey PNG (first row: largest y), its origin in the world (m), the places, the dock.
+
+    A room has an outline, a named pose the angle in which the robot looks there.
+    """
     grey = grid.grey(**_GREY)
     png = cv2.imencode(".png", np.ascontiguousarray(grey[::-1]), [cv2.IMWRITE_PNG_COMPRESSION, 9])[1].tobytes()
     width_m, height_m = grid.size_m
-    middles = {name: np.mean(outline, axis=0) for name, outline in knowledge.rooms.items()}
+    rooms = knowledge.rooms
+    middles = {name: np.mean(outline, axis=0) for name, outline in rooms.items()}
     middles |= {name: np.array([pose.x, pose.y]) for name in knowledge.poses if (pose := knowledge.place_pose(name))}
     return {
         "world": world,
@@ -124,7 +129,7 @@ def map_message(grid: GridMap, knowledge: Knowledge, *, world: str) -> Mapping[s
         "data": base64.b64encode(png).decode(),
         "places": [
             {"name": name, "x": round(float(x), 3), "y": round(float(y), 3)}
-            | ({"outline": knowledge.rooms[name]} if name in knowledge.rooms else {})
+            | ({"outline": rooms[name]} if name in rooms else {"yaw_rad": round(knowledge.place_pose(name).yaw, 3)})
             for name, (x, y) in middles.items()
         ],
         "dock": None if knowledge.dock is None else {"x": knowledge.dock.x, "y": knowledge.dock.y},

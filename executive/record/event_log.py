@@ -22,7 +22,9 @@ from mcap.writer import Writer
 from pydantic_core import to_jsonable_python
 
 from executive.record.other_tools import grid_of, joints_message, scan_message, scene_of, transform_of
-from executive.record.schemas import (
+from executive.run.outcome import RunResult
+from executive.run.visitor import Progress, RunSettings, RunVisitor
+from executive.words.schemas import (
     BOXES,
     DETECTIONS,
     GRID,
@@ -42,8 +44,6 @@ from executive.record.schemas import (
     schema_of,
     stamp,
 )
-from executive.run.outcome import RunResult
-from executive.run.visitor import Progress, RunSettings, RunVisitor
 from executive.words.slug import slug
 from skills.api import Worker
 from skills.robot import Clock, Joints, Pose2D, Scan

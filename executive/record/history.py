@@ -16,7 +16,10 @@ from mcap.reader import NonSeekingReader
 from py_trees.common import Status
 from zstandard import ZstdError
 
-from executive.record.schemas import (
+from executive.tree.node import NodeState
+from executive.tree.node_view import NodeView, logged_view
+from executive.words.robot_config import find_robot
+from executive.words.schemas import (
     ACTIVITY,
     CONTROL,
     DESTINATION,
@@ -34,9 +37,6 @@ from executive.record.schemas import (
     TREE,
     WALL,
 )
-from executive.tree.node import NodeState
-from executive.tree.node_view import NodeView, logged_view
-from executive.words.robot_config import find_robot
 from skills.api import Cause, ObjectKind, ObjectObservation
 from skills.class_forms import ANY_OBJECT
 from skills.descriptions import distinct_objects
@@ -49,7 +49,7 @@ RECORDING: Final = "recording.html"
 _WRITTEN: Final = "name a log.mcap that a run has written"
 _ROS_1: Final = b"#ROSBAG V2"
 _SQLITE: Final = b"SQLite format 3"
-_DAMAGE = (McapError, struct.error, ZstdError, ValueError)
+_DAMAGE = (McapError, struct.error, ZstdError, ValueError, RecursionError)
 
 
 @dataclass(frozen=True)

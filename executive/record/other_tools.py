@@ -12,7 +12,7 @@ from typing import Any, Final
 import cv2
 import numpy as np
 
-from executive.record.schemas import pose_values, stamp
+from executive.words.schemas import pose_values, stamp
 from executive.words.slug import slug
 from skills.map_drawing import ZONE_COLOURS
 from skills.robot import Joints, Scan

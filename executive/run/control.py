@@ -227,8 +227,11 @@ class Control:
         """
         self._request(MissionRequest(tree, Turn.INSTEAD, instead_of), "replace", f"instead '{tree.mission_name}'")
 
-    def answer(self, question_id: str, text: str) -> None:
-        """Answers an open question. Raises ValueError when it is not open, or `text` is none of the choices."""
+    def answer(self, question_id: str, text: str, *, spoken: bool = False) -> None:
+        """Answers an open question. Raises ValueError when it is not open, or `text` is none of the choices.
+
+        Words `spoken` to the robot reach it in any case; it asks again if it does not understand them.
+        """
         pending = self._questions.get(question_id)
         if pending is None:
             raise ValueError(f"the question '{question_id[:80]}' is not open")
@@ -238,7 +241,7 @@ class Control:
             raise ValueError(str(error)) from error
         options = pending.open.options
         said = next((option for option in options if option.lower() == said.strip().lower()), said)
-        if options and said not in options:
+        if options and said not in options and not spoken:
             raise ValueError(f"'{said}' is no answer to '{question_id}'; choose one of: {', '.join(options)}")
         self._close_question(pending, said, "answer", text)
 

@@ -10,7 +10,6 @@ from typing import Any, Final
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.record.schemas import SPEECH
 from executive.run.outcome import Execution, Finding, Said
 from executive.tree.behaviour import Explained
 from executive.tree.board import Board
@@ -18,6 +17,7 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.words.goal import GoalKind
+from executive.words.schemas import DETECTIONS, SPEECH
 from executive.words.slug import slug
 from skills.api import Part
 from skills.robot import Clock
@@ -143,15 +143,15 @@ class Executions:
             for below in self._below[path] - {path}:
                 executions = self._executions(below)
                 self._put(below, (replace(each, done=each.done and each.began_s < one.began_s) for each in executions))
-        over = replace(one, ended_s=self._clock.now(), done=done)
+        over = replace(one, ended_s=self._clock.now(), done=done, succeeded=done)
         self._put(path, (*before, over) if path in self._parts else ())
 
     def _executions(self, path: str) -> tuple[Execution, ...]:
-        stored: tuple[tuple[float, float | None, bool], ...] = self._board.get(f"{path}/executions", ())
+        stored: tuple[tuple[float, float | None, bool, bool], ...] = self._board.get(f"{path}/executions", ())
         return tuple(Execution(path, *one) for one in stored)
 
     def _put(self, path: str, executions: Iterable[Execution]) -> None:
-        stored = tuple((one.began_s, one.ended_s, one.done) for one in executions)
+        stored = tuple((one.began_s, one.ended_s, one.done, one.succeeded) for one in executions)
         key = f"{path}/executions"
         if stored or key in self._board:
             self._board.put(key, stored)
@@ -168,26 +168,29 @@ class Findings:
     """Collection of the answers and the speech of one mission.
 
     Any node adds a finding by publishing under `ANSWER_TOPIC`: `node`, `question`, `answer` (a truth value, a text or a
-    number) and `message`, the sentence. The collection adds time and robot. It lies on the blackboard, so that a
-    mission that continues after a restart has its earlier findings. A node listed under `answered_before` repeats its
-    answer without a second finding.
+    number) and `message`, the sentence. The collection adds the time, the robot and the time of the last picture. It
+    lies on the blackboard, so that a mission that continues after a restart has its earlier findings. A node listed
+    under `answered_before` repeats its answer without a second finding.
     """
 
     def __init__(self, clock: Clock, board: Board, robot_name: str, mission_name: str) -> None:
         self._clock, self._board, self._robot_name = clock, board, robot_name
         self._keys = history_keys(robot_name, mission_name)
+        self._seen_s: float | None = None
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
         """Records a message of the mission and returns it; adds the time and the robot's name to an answer."""
         if topic == ANSWER_TOPIC:
             message = {**message, "robot": self._robot_name, "t": round(self._clock.now(), 6)}
-            finding = _finding(message)
+            finding = replace(_finding(message), seen_s=self._seen_s)
             again = frozenset(self._board.get(self._keys.answered_before, ()))
             if finding.path_id in again:
                 self._board.put(self._keys.answered_before, again - {finding.path_id})
             before = next((one for one in reversed(self.findings) if one.path_id == finding.path_id), None)
             if finding.path_id not in again or before is None or before.answer != finding.answer:
                 self._board.put(self._keys.findings, (*self.findings, finding))
+        elif topic == DETECTIONS:
+            self._seen_s = float(message["stamp_s"])
         elif topic == SPEECH:
             now_s = round(self._clock.now(), 6)
             asked, silent = bool(message.get("asked", False)), str(message.get("silent", ""))

@@ -27,13 +27,17 @@ class Outcome(enum.Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """Answer that a node gave or received at `t_s` (s on the robot's clock), as a value and as a sentence."""
+    """Answer that a node gave or received at `t_s` (s on the robot's clock), as a value and as a sentence.
+
+    `seen_s` is the time of the mission's last picture before it (None: there was none).
+    """
 
     path_id: str
     t_s: float
     question: str
     answer: bool | str | float | None
     sentence: str
+    seen_s: float | None = None
 
 
 @dataclass(frozen=True)
@@ -53,7 +57,7 @@ class Said:
 class Execution:
     """One execution of a step in a mission, from `began_s` to `ended_s` (s on the robot's clock; None: not ended).
 
-    It is `done` when it succeeded and no node above it failed or was stopped in that time: work in a failed branch,
+    It is `done` when it `succeeded` and no node above it failed or was stopped in that time: work in a failed branch,
     attempt or round does not count.
     """
 
@@ -61,6 +65,7 @@ class Execution:
     began_s: float
     ended_s: float | None = None
     done: bool = False
+    succeeded: bool = False
 
 
 @dataclass(frozen=True)

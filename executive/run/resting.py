@@ -4,70 +4,53 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any, Final
 
 from executive.run.session import RunRobot
 from executive.run.traffic_table import TrafficTable
 from executive.run.watchdog import Watchdog
-from skills.api import Running, SkillContext
-from skills.navigate.giving_way import GivingWay
-from skills.navigate.skill import Navigate
-from skills.navigate.surroundings import NavigateInputs
+from executive.tree.registry import installed_skills, missing_skill
+from skills.api import Running, Skill, SkillContext
+from skills.inputs.errors import InputError
 
 _LOOK_S = 0.5
-
-
-class SteppingAside:
-    """Drives an idle robot to a waiting place whenever it stands in a path that another robot has reserved."""
-
-    def __init__(self, context: SkillContext) -> None:
-        self._context, self._skill = context, Navigate(context)
-        self._giving = GivingWay(context, self._skill.options.giving_way)
-        self._due_s = context.clock.now()
-        self.drives = False
-        self.moved = False
-
-    def step(self) -> None:
-        """Runs one tick. Raises the errors of the robot's verbs."""
-        if not self.drives:
-            self._clear_path()
-        elif not isinstance(self._skill.step(), Running):
-            self.end()
-
-    def end(self) -> None:
-        """Ends the drive. Idempotent; raises the errors of the robot's verbs."""
-        if self.drives:
-            self.drives = False
-            self._due_s = self._context.clock.now() + _LOOK_S
-            self._skill.end()
-
-    def _clear_path(self) -> None:
-        """Begins to drive away if a robot with the right of way needs the space and another place is free."""
-        if self._context.clock.now() < self._due_s or not self._context.localiser.estimate().localised:
-            return
-        self._due_s = self._context.clock.now() + _LOOK_S
-        here, footprint = self._context.pose(), self._skill.outline()
-        if not self._giving.blocked_robots(here, footprint):
-            return
-        place = self._giving.waiting_pose(self._context.free_space(), footprint, here)
-        if place is not None:
-            self._skill = Navigate(self._context)
-            self._skill.begin(NavigateInputs(place))
-            self.drives = self.moved = True
+_STEP_ASIDE: Final = "step_aside"
 
 
 @dataclass
 class _Robot:
     who: RunRobot
-    aside: SteppingAside
+    aside: Skill[Any]
     own_lease: bool
+    drives: bool = False
+    moved: bool = False
     sense_due_s: float = -math.inf
+    aside_due_s: float = -math.inf
+
+    def step_aside(self) -> None:
+        """Clears the path of another robot, for one tick. Raises the errors of the robot's verbs."""
+        now_s = self.who.context.clock.now()
+        if not self.drives and now_s >= self.aside_due_s:
+            self.aside_due_s = now_s + _LOOK_S
+            self.aside.begin(self.aside.Inputs())
+            self.drives = True
+        if self.drives and not isinstance(self.aside.step(), Running):
+            self.stand()
+        self.moved = self.moved or self.drives
+
+    def stand(self) -> None:
+        """Ends the drive. Idempotent; raises the errors of the robot's verbs."""
+        if self.drives:
+            self.drives = False
+            self.aside_due_s = self.who.context.clock.now() + _LOOK_S
+            self.aside.end()
 
 
 @dataclass
 class Resting:
     """Robots in a run that have no work now: they wait for their turn, have finished, or never had a mission.
 
-    A robot whose verb fails is not used any more.
+    A robot whose verb fails is not used any more. The constructor raises InputError without the skill `step_aside`.
     """
 
     table: TrafficTable
@@ -75,6 +58,10 @@ class Resting:
     tick_limit_s: float
     stepped_aside: set[str] = field(default_factory=set)
     _robots: dict[str, _Robot] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if _STEP_ASIDE not in (registry := installed_skills()).names:
+            raise InputError(missing_skill(_STEP_ASIDE, registry)[0], hint="install this project again: make env")
 
     def wait(self, who: RunRobot) -> None:
         """Adds a robot whose mission waits for other missions; the run updates the robot's estimators."""
@@ -91,9 +78,9 @@ class Resting:
         if robot is None:
             return
         self.table.rest(name, idle=False)
-        if robot.aside.moved and robot.own_lease:
+        if robot.moved and robot.own_lease:
             self.stepped_aside.add(name)
-        robot.who.attempt("resting", robot.aside.end)
+        robot.who.attempt("resting", robot.stand)
         if robot.own_lease:
             robot.who.context.traffic.release()
             robot.who.stop_and_leave()
@@ -112,18 +99,18 @@ class Resting:
                     self.leave(name)
 
     def _begin(self, who: RunRobot, context: SkillContext, *, own_lease: bool) -> None:
-        self._robots[who.name] = _Robot(who, SteppingAside(context), own_lease)
+        self._robots[who.name] = _Robot(who, installed_skills()[_STEP_ASIDE](context), own_lease)
         self.table.rest(who.name, idle=True)
 
     def _step(self, robot: _Robot, *, hold: bool) -> None:
         if robot.own_lease:
             now_s = robot.who.context.clock.now()
-            if robot.aside.drives or now_s >= robot.sense_due_s:  # a robot that stands senses seldom
+            if robot.drives or now_s >= robot.sense_due_s:  # a robot that stands senses seldom
                 robot.sense_due_s = now_s + _LOOK_S
                 robot.who.sense()
             else:
                 self.table.report(robot.who.name, robot.who.context.known_pose())
         if hold:
-            robot.aside.end()
+            robot.stand()
         else:
-            robot.aside.step()
+            robot.step_aside()

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from executive.record.schemas import DOORS, JOINTS, NAVIGATION, POSE, SCAN, STATE, pose_values, stamp
+from executive.words.schemas import DOORS, JOINTS, NAVIGATION, POSE, SCAN, STATE, pose_values, stamp
 from skills.api import LocalisationEstimate, ObstacleLayerView, ParticleView, SkillContext
 from skills.doorway import Doorway, SeenDoor
 from skills.robot import Pose2D

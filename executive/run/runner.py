@@ -8,7 +8,6 @@ from dataclasses import replace
 from functools import partial
 from typing import Final
 
-from executive.record.schemas import CONTROL, OUTCOME, RESERVED_PATH
 from executive.run.control import Control
 from executive.run.control_state import ControlRequests, Event
 from executive.run.outcome import Ending, Outcome, RobotResult, RobotStatus, RunResult, ending_of
@@ -27,6 +26,7 @@ from executive.run.visitor import (
 )
 from executive.run.watchdog import VerbHung
 from executive.tree.behaviour import StoppableTime
+from executive.words.schemas import CONTROL, OUTCOME, RESERVED_PATH
 from skills.api import Cause, Worker
 from skills.inputs.errors import shortage
 from skills.robot import Clock

@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final, TypeVar
 
-from executive.record.schemas import OUTCOME
-from executive.record.work import CountedDetector
 from executive.run.control_state import MissionRequest, Turn
 from executive.run.guarded_robot import GuardedRobot
 from executive.run.outcome import Ending, Outcome, RobotResult, RobotStatus, ending_of
@@ -15,18 +13,19 @@ from executive.run.robot_log import RobotLog
 from executive.run.tree_run import TreeRun
 from executive.run.visitor import RunEntry, RunShared, TickNote
 from executive.run.watchdog import VerbHung
+from executive.run.work import CountedDetector
 from executive.tree.board import Board
 from executive.tree.compiler import CompiledTree
 from executive.tree.context import RunContext
 from executive.tree.node import NodeState, Snapshot
 from executive.tree.nodes.skill_leaf import ERROR_TOPIC
 from executive.tree.plan import start_key
+from executive.words.schemas import OUTCOME
 from executive.words.slug import slug
 from skills.api import Cause
-from skills.detection import Detector
+from skills.doorway import look_at_doors
 from skills.footprint import Footprint
 from skills.inputs.errors import shortage
-from skills.navigate.cut_off import DoorWatch
 from skills.robot import Lease, Pose2D
 
 HOLDER: Final = "errand"
@@ -37,15 +36,6 @@ LEASE_PATIENCE_S: Final = 60.0
 SILENT_S: Final = 3.0
 _EPSILON_S: Final = 1e-9
 ResultT = TypeVar("ResultT")
-
-
-def _with_tags(entry: RunEntry) -> Detector:
-    """Returns a robot's detector; where the world has tags, it recognises objects by their tags as well."""
-    if not entry.tree.tags:
-        return entry.detector
-    from skills.perception.fiducials import with_tags
-
-    return with_tags(entry.detector, entry.tree.tags)
 
 
 class RunRobot:
@@ -84,7 +74,7 @@ class RunRobot:
             stop_pressed=lambda: control.stop_pressed(name),
             presses=lambda: control.presses,
             day_began_s=shared.day_began_s,
-            detector=CountedDetector(_with_tags(entry), shared.work),
+            detector=CountedDetector(entry.detector, shared.work),
             work=shared.work,
             stack=entry.stack,
             doors=entry.tree.doors,
@@ -167,7 +157,7 @@ class Session(RunRobot):
         self.gone: str | None = None
         self.note: TickNote | None = None
         self._asked_at: Pose2D | None = None
-        self._log, self._doors = RobotLog(self.name, self.context), DoorWatch(self.context)
+        self._log = RobotLog(self.name, self.context)
         self._matched_s, self._look_due_s = -math.inf, shared.clock.now()
 
     @property
@@ -228,7 +218,8 @@ class Session(RunRobot):
             self.context.work.count("scan_matches")
         if now_s >= self._look_due_s - _EPSILON_S:
             self._look_due_s += LOOK_PERIOD_S
-            self._doors.look()
+            context = self.context
+            look_at_doors(context.doors, context.door_memory, context.robot, context.localiser)
         self._log.write()
 
     def may_move(self) -> bool:

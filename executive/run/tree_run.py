@@ -7,7 +7,6 @@ from dataclasses import replace
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.record.schemas import ACTIVITY, TRANSITIONS, TREE
 from executive.run.mission_history import BEFORE, Executions, Findings, achieved, claim, findings_in_words
 from executive.run.outcome import Ending, Outcome, RobotResult
 from executive.run.visitor import TickNote, Visitors
@@ -17,7 +16,9 @@ from executive.tree.context import Endings, RunContext
 from executive.tree.node import Change, NodeState, Snapshot
 from executive.tree.node_view import node_view
 from executive.words.goal import GoalKind
+from executive.words.schemas import ACTIVITY, TRANSITIONS, TREE
 from skills.api import Cause
+from skills.inputs.errors import listing
 from skills.zone_map import zone_messages
 
 POSE_NOTE_PERIOD_S = 1.0
@@ -165,7 +166,9 @@ class TreeRun:
         Each stop is called through `attempt`, so that an error in one does not prevent the others.
         """
         for node in self.context.endings.close():
-            self._endings.append(f"in the end, broken off: {message_of(node)}")
+            steps = listing(each.name for each in node.children or [node])
+            what = message_of(node) if node.status == Status.RUNNING else steps
+            self._endings.append(f"in the end, broken off: {what}")
             attempt("stop what is done in the end", lambda node=node: node.stop(Status.INVALID))  # type: ignore[misc]
         if not self.finished and not self._ended_early:
             attempt("stop the tree", lambda: self.root.stop(Status.INVALID))

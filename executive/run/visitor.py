@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from py_trees.behaviour import Behaviour
 
-from executive.record.work import Work
 from executive.run.control import Control
 from executive.run.outcome import RobotResult, RobotStatus, RunResult
 from executive.run.traffic_table import TrafficTable
 from executive.run.watchdog import IMAGE_LIMIT_S, TICK_LIMIT_S, VERB_LIMIT_S, Watchdog
+from executive.run.work import Work
 from executive.tree.compiler import CompiledTree
 from executive.tree.context import RunContext
 from executive.tree.node import Change, Snapshot

@@ -14,7 +14,7 @@ from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Any, Final, Generic, TypeVar
 
-from skills.api import Job, Worker
+from skills.api import Job
 from skills.robot import Clock
 
 ResultT = TypeVar("ResultT")
@@ -226,21 +226,3 @@ class ThreadWorker:
     def close(self) -> None:
         """Drops jobs that have not begun; the running job ends by itself."""
         self._thread.close(0.0)
-
-
-@dataclass(frozen=True)
-class TimedWorker:
-    """Worker that passes each job, wrapped by `timed`, to another worker."""
-
-    worker: Worker
-    timed: Callable[[Callable[..., Any]], Callable[..., Any]]
-
-    def submit(self, work: Callable[[], ResultT], *, latency_s: float, name: str) -> Job[ResultT]:
-        """Submits the wrapped job to the other worker."""
-        return self.worker.submit(self.timed(work), latency_s=latency_s, name=name)
-
-    def sense(
-        self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
-    ) -> Job[ResultT]:
-        """Submits a wrapped job that works on the value of `read`."""
-        return self.worker.sense(read, self.timed(work), latency_s=latency_s, name=name)

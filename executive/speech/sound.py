@@ -84,6 +84,8 @@ def _runs(flags: npt.NDArray[np.bool_]) -> int:
 _OPEN_END: Final = 0x7FFF_F000
 """Size from which on the head's writer did not know it (recorders that write into a pipe)."""
 _HEAD_BYTES: Final = 44
+_PHONES: Final = re.compile(rb".{4}ftyp|\x1aE\xdf\xa3|\xff[\xf1\xf9]|#!AMR", re.DOTALL)
+"""Heads of MP4 (m4a), WebM, AAC and AMR, which libsndfile does not read."""
 MOST_BYTES: Final = 8_000_000_000
 _RATES_HZ: Final = range(4_000, 384_001)
 _CONTEXT: Final = 16
@@ -105,6 +107,9 @@ def read_sound(file: Path) -> Iterator[Samples]:
     try:
         with file.open("rb") as stream:
             head = stream.read(_HEAD_BYTES)
+        if _PHONES.match(head):
+            hint = f"convert it: ffmpeg -i {file.name} {file.stem}.wav"
+            raise InputError("it is a recording of a phone or browser", hint=hint, file=file)
         with _opened(file) as sound:
             rate_hz, gains = sound.samplerate, mixing(_blocks(file, head, sound), sound.samplerate)
         with _opened(file) as sound:

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cache
+from hashlib import blake2b
+from itertools import product
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
@@ -27,7 +29,8 @@ class FileKind:
     `name` is the kind's name in messages, `option` the option to name another file. The other fields are parts of
     messages: `absent` names the command that writes the file, `lost` the data in it, `older` the action for a file of
     another version, `claimed` the work of the process that has claimed it. `go_on` says how to continue after a lack of
-    disk, files or memory; "{path}" in it stands for the file.
+    disk, files or memory; "{path}" in it stands for the file. Each row of the tables `summed` has a checksum in its
+    column `sum`; the first column has the number of the row's mission.
     """
 
     name: str
@@ -40,6 +43,7 @@ class FileKind:
     older: str
     claimed: str
     go_on: str
+    summed: tuple[str, ...] = ()
 
     def shortage_error(self, path: Path, lack: str) -> StoreError:
         """Returns the error for what this machine lacks, as in "the disk is full"."""
@@ -161,12 +165,31 @@ class Database:
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = NORMAL")
         connection.execute("PRAGMA foreign_keys = ON")
+        connection.create_function("checksum", -1, _checksum, deterministic=True)
         if not tables:
             with transaction(connection):
                 for statement in filter(str.strip, kind.schema.split(";")):
                     connection.execute(statement)
+                for table, event in product(kind.summed, ("INSERT", "UPDATE")):
+                    put = f"UPDATE {table} SET sum = {self._checksum_of(table)} WHERE rowid = NEW.rowid"
+                    connection.execute(f"CREATE TRIGGER {table}_{event} AFTER {event} ON {table} BEGIN {put}; END")
                 connection.execute(f"PRAGMA application_id = {kind.application_id}")
                 connection.execute(f"PRAGMA user_version = {kind.version}")
+        for table in kind.summed:
+            changed = connection.execute(
+                f"SELECT * FROM {table} WHERE sum IS NOT {self._checksum_of(table)}"
+            ).fetchone()
+            if changed is not None:
+                raise kind.damage_error(self.path, f"its {table} of mission {changed[0]} has changed by itself")
+
+    def _checksum_of(self, table: str) -> str:
+        """Returns the SQL expression for the checksum of a row."""
+        columns = [row[1] for row in self._connection.execute(f"PRAGMA table_info({table})")]
+        return f"checksum({', '.join(name for name in columns if name != 'sum')})"
+
+
+def _checksum(*values: object) -> str:
+    return blake2b(repr(values).encode(errors="surrogateescape"), digest_size=8).hexdigest()
 
 
 @cache
@@ -192,7 +215,8 @@ STORE_FILE: Final = FileKind(
     name="store",
     option="--store",
     application_id=0x45525244,  # "ERRD"
-    version=10,
+    version=11,
+    summed=("mission", "step", "value"),
     absent="run or queue a mission first, or name one by --store",
     lost="its missions",
     older="finish its missions with the version that wrote it",
@@ -218,18 +242,21 @@ CREATE TABLE IF NOT EXISTS mission (
     since TEXT,
     standing INTEGER,
     why TEXT NOT NULL DEFAULT '',
-    given TEXT
+    given TEXT,
+    sum TEXT
 );
 CREATE TABLE IF NOT EXISTS step (
     mission INTEGER NOT NULL REFERENCES mission (id) ON DELETE CASCADE,
     path_id TEXT NOT NULL,
     record TEXT NOT NULL,
+    sum TEXT,
     PRIMARY KEY (mission, path_id)
 );
 CREATE TABLE IF NOT EXISTS value (
     mission INTEGER NOT NULL REFERENCES mission (id) ON DELETE CASCADE,
     key TEXT NOT NULL,
     text TEXT NOT NULL,
+    sum TEXT,
     PRIMARY KEY (mission, key)
 );
 """,

@@ -23,8 +23,8 @@ from skills.robot import Pose2D
 
 MOVED_M: Final = 0.02
 TURNED_RAD: Final = 0.02
-_PUT_STEP: Final = "INSERT OR REPLACE INTO step VALUES (?, ?, ?)"
-_PUT_VALUE: Final = "INSERT OR REPLACE INTO value VALUES (?, ?, ?)"
+_PUT_STEP: Final = "INSERT OR REPLACE INTO step (mission, path_id, record) VALUES (?, ?, ?)"
+_PUT_VALUE: Final = "INSERT OR REPLACE INTO value (mission, key, text) VALUES (?, ?, ?)"
 _NOTE: Final = """
 UPDATE mission SET clock_s = :clock_s, poses = json_patch(poses, :poses),
 lowest_charge = coalesce(min(lowest_charge, :lowest), lowest_charge, :lowest),

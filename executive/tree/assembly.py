@@ -277,6 +277,6 @@ def words_of(steps: Sequence[Step]) -> str:
 def _command_words(command: Command) -> str:
     """Short text of a command: "grasp coke at kitchen table"."""
     item = command.object or command.item
-    action = command.task.value if command.task is not None else "take" if command.item is not None else "go"
+    action = command.task.word if command.task is not None else "take" if command.item is not None else "go"
     goal = "" if command.goal is None else f"{'at' if command.task is not None else 'to'} {command.goal}"
     return " ".join(filter(None, (action, str(item or ""), goal)))

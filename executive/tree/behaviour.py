@@ -116,6 +116,8 @@ class ExplainedNode(_TakesKeywords, Explained):
     afresh: ClassVar[bool] = False
     """After a restart nothing of it is restored, since its condition calls it again."""
     runs_skill: ClassVar[bool] = False
+    answers: ClassVar[bool] = False
+    """It turns what its child found into the answer to a question."""
     skips: ClassVar[bool] = False
     """It succeeds although its child fails, and says why the child is skipped."""
     control: ClassVar[str] = ""

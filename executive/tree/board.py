@@ -104,18 +104,6 @@ class BesideBoard(FromBoard):
 
 
 @dataclass(frozen=True)
-class PlaceOf(FromBoard):
-    """Binding of a port to the position (x, y) of the person whose observation is under a blackboard key."""
-
-    gives: ClassVar[Any] = tuple[Coordinate, Coordinate]
-
-    def read(self, board: Board) -> tuple[float, float]:
-        """Returns the position. Raises KeyError when no person was observed yet."""
-        seen: ObjectObservation = board.get(self.key)
-        return seen.position_W[0], seen.position_W[1]
-
-
-@dataclass(frozen=True)
 class SurfaceOfDetection(FromBoard):
     """Binding of a port to the surface below a detected object; to all surfaces if that surface is unknown."""
 

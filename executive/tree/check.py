@@ -15,22 +15,20 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Estimate, Estimates, Route, RoutePlanner, estimate_tree
 from executive.tree.node import NodeSpec
 from executive.tree.plan import StepPart
-from executive.words.command import START, Command, Task
+from executive.words.command import START, Command
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import area_m2
 from skills.api import FreeSpace, Part, PlanningError, Zone, ZoneKind
 from skills.footprint import Footprint
 from skills.inputs.errors import InputError, SourceLine, listing, suggestion
-from skills.path import Path, path_length
-from skills.robot import Pose2D
-from skills.stack import GlobalPlanner
+from skills.path import GlobalPlanner, Path, path_length
+from skills.robot import Capabilities, Pose2D
 from skills.world_model import zones_sentence
 
 if TYPE_CHECKING:
     from skills.zone_map import ZoneMap
 
 
-_TAKE_PICTURE: Final = "take_picture"
 Fault = tuple[str, str]
 """Error in a part of a mission, and a hint."""
 _OTHER_KIND: Final = "choose another kind of robot"
@@ -44,9 +42,8 @@ class Abilities:
     `classes` and `attributes`; a search for several objects fails for any others. `reaches_m` are the heights of the
     lowest and the highest reachable surface. `widths_m` has the least width of each class, `opens_m` is the gripper's
     maximum opening; `gripper` is False without a gripper, `arm` without an arm, `looks` without a camera for objects.
-    `cameras` are the robot's cameras with their heights in m (infinite for one that moves). `takers` are the people who
-    take objects from the robot (None: unknown). `taken_m2` is the covered area of each surface, `apart_m` the clearance
-    around an object.
+    `capabilities` are the robot's (None: unknown). `takers` are the people who take objects from it (None: unknown).
+    `taken_m2` is the covered area of each surface, `apart_m` the clearance around an object.
     """
 
     masses_kg: Mapping[str, float]
@@ -62,7 +59,7 @@ class Abilities:
     takers: frozenset[str] | None = None
     taken_m2: Mapping[str, float] = field(default_factory=dict)
     apart_m: float = 0.0
-    cameras: Mapping[str, float] = field(default_factory=dict)
+    capabilities: Capabilities | None = None
 
 
 @dataclass(frozen=True)
@@ -185,11 +182,11 @@ def check_tree(
     needs = ((part, _objection(part, before, knowledge, abilities)) for part, before in starts)
     grasps = errors((part, each) for part, each in needs if each is not None)
     full = errors(_full_surfaces(tree, knowledge, abilities))
-    unseen = _unseen(tree.root, abilities)
+    refused = _refused(tree.root, abilities.capabilities)
     estimate, unreachable, warnings = estimate_tree(
         tree.root, start=start, planner=planner, estimates=estimates, zones=tree.zones
     )
-    return Checked((*impossible, *grasps, *unseen, *unreachable), estimate, (*full, *warnings))
+    return Checked((*impossible, *grasps, *refused, *unreachable), estimate, (*full, *warnings))
 
 
 def _objection(part: StepPart, held: InGripper | None, knowledge: Knowledge, abilities: Abilities) -> Fault | None:
@@ -215,18 +212,18 @@ def _impossible(command: Command, knowledge: Knowledge, abilities: Abilities) ->
 
     The object may be unknown or impossible to take, the person may take nothing, or the surface may be out of reach.
     """
-    handles = command.item is not None or command.task in (Task.GRASP, Task.PLACE)
+    handles = command.item is not None or command.takes or command.puts
     if handles and not abilities.gripper:
         what = command.item or command.object
         yield f"this kind of robot has no gripper to take the {what} with", _OTHER_KIND
         return
-    if command.task is Task.FIND and not abilities.looks:
+    if command.looks and not abilities.looks:
         yield f"this kind of robot has no camera to look for the {command.object} with", _OTHER_KIND
         return
     yield from _nobody_takes(command, knowledge, abilities)
-    if (command.item is not None or command.task is Task.GRASP) and command.goal is not None:
+    if (command.item is not None or command.takes) and command.goal is not None:
         yield from _out_of_reach(command.goal, knowledge, abilities)
-    if command.task not in (Task.GRASP, Task.FIND) or command.object is None:
+    if not (command.takes or command.looks) or command.object is None:
         return
     item = command.object
     classes = knowledge.classes(item.name)
@@ -235,13 +232,13 @@ def _impossible(command: Command, knowledge: Knowledge, abilities: Abilities) ->
     narrowest_m = min((abilities.widths_m.get(one, 0.0) for one in light), default=0.0)
     unseen = [one for one in classes if not {one, item.name} & abilities.classes]
     unseen += [word for word in item.attributes if word not in abilities.attributes]
-    if command.task is Task.GRASP and not masses:
+    if command.takes and not masses:
         known = [one for one in knowledge.things if one in abilities.masses_kg]
         yield f"there is no '{item.name}' that could be picked up", suggestion(item.name, known)
-    elif command.task is Task.GRASP and min(masses) > abilities.lift_kg:
+    elif command.takes and min(masses) > abilities.lift_kg:
         message = f"'{item.name}' is too heavy: {min(masses):g} kg, and the arm lifts {abilities.lift_kg:g} kg"
         yield message, "ask for something lighter"
-    elif command.task is Task.GRASP and narrowest_m > abilities.opens_m:
+    elif command.takes and narrowest_m > abilities.opens_m:
         message = f"'{item.name}' is too wide: {narrowest_m:g} m, and the gripper takes {abilities.opens_m:g} m"
         yield message, "ask for something narrower"
     elif unseen:
@@ -250,27 +247,24 @@ def _impossible(command: Command, knowledge: Knowledge, abilities: Abilities) ->
         yield message, f"it knows {listing(known)} by sight"
 
 
-def _unseen(root: NodeSpec, abilities: Abilities) -> tuple[InputError, ...]:
-    """Returns the errors of pictures by a camera that the robot lacks, or that is lower than the top to be seen."""
+def _refused(root: NodeSpec, capabilities: Capabilities | None) -> tuple[InputError, ...]:
+    """Returns the errors of skills that refuse the robot or their constant inputs."""
     found = dict[tuple[str, SourceLine | None], InputError]()
-    for node in (each for each in root.walk() if each.skill is not None and each.skill.name == _TAKE_PICTURE):
-        inputs = {name: each.value for name, each in node.options["inputs"].items() if isinstance(each, Constant)}
-        camera, cameras = str(inputs.get("camera", "")).lower().replace(" ", ""), abilities.cameras
-        if camera and camera not in cameras:
-            hint = suggestion(camera, cameras) if cameras else _OTHER_KIND
-            what = f"the robot has no camera '{inputs['camera']}'"
-        elif camera and inputs.get("top") and cameras[camera] <= inputs["point_W"][2]:
-            top_m, hint = inputs["point_W"][2], "leave the camera out, or name a higher one"
-            what = f"the {camera} camera, {cameras[camera]:.2f} m high, does not see a top {top_m:g} m high"
-        else:
-            continue
-        found[what, node.source] = InputError.at(node.source, what, hint=hint)
+    if capabilities is None:
+        return ()
+    for node in root.walk():
+        given = node.options.get("inputs", {}).items()
+        inputs = {name: each.value for name, each in given if isinstance(each, Constant)}
+        refusal = None if node.skill is None else node.skill.refuses(inputs, capabilities)
+        if refusal is not None:
+            what, hint = refusal
+            found[what, node.source] = InputError.at(node.source, what, hint=hint)
     return tuple(found.values())
 
 
 def _nobody_takes(command: Command, knowledge: Knowledge, abilities: Abilities) -> Iterator[Fault]:
     """Yields the errors for a hand-over to nobody, or to a person who takes nothing."""
-    if command.item is None or command.task is Task.PLACE or abilities.takers is None:
+    if command.item is None or command.puts or abilities.takers is None:
         return
     person = None if command.goal is None else knowledge.person(command.goal)
     if command.goal == START and not abilities.takers:
@@ -289,7 +283,7 @@ def _full_surfaces(tree: CompiledTree, knowledge: Knowledge, abilities: Abilitie
     brought_m2: dict[str, float] = {}
     for part in tree.parts:
         command = part.command
-        item = None if command is None else command.item or (command.object if command.task is Task.PLACE else None)
+        item = None if command is None else command.carried
         place = None if command is None or command.goal is None else knowledge.place(command.goal)
         if command is None or item is None or place is None or not knowledge.surfaces_in(place):
             continue

@@ -10,8 +10,9 @@ from py_trees.behaviour import Behaviour
 
 from executive.tree.behaviour import Hook
 from executive.tree.board import Board
-from skills.api import ExcludesRobots, Part, Skill, SkillContext
+from skills.api import Part, Skill, SkillContext
 from skills.robot import Pose2D
+from skills.world_model import ExcludesRobots
 
 DAY_S: Final = 86_400.0
 

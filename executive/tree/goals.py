@@ -1,13 +1,15 @@
 """Derives goal conditions from commands and skills in the known world."""
 
-from collections.abc import Callable, Iterable, Mapping
-from types import MappingProxyType
+from collections.abc import Iterable
+from dataclasses import replace
+from types import NoneType
 from typing import Final
 
 from executive.mission.world_names import in_world
-from executive.words.command import SPEAKER, START, Command, Task
+from executive.tree.task_page import from_page
+from executive.words.command import START, Command
 from executive.words.goal import GoalCondition, GoalKind, Region, When
-from executive.words.knowledge import ANYBODY, Knowledge, Pose
+from executive.words.knowledge import Knowledge, Pose
 from skills.api import ObjectKind
 from skills.relations import RelationKind
 
@@ -17,20 +19,23 @@ FLOOR_M: Final = (-0.05, 0.30)
 NEAR_M: Final = 0.75
 POSE_NEAR_M: Final = 0.25
 DOOR_NEAR_M: Final = 0.3
-_Goal = Callable[[Command, Knowledge, tuple[str, ...]], GoalCondition | None]
 
 
 def command_goal(command: Command, knowledge: Knowledge, elsewhere: Iterable[str] = ()) -> GoalCondition | None:
     """Goal condition of a command; the object may also be taken from the surfaces `elsewhere`.
 
-    None for waiting at the present pose.
+    None for a task that is not judged there, such as waiting at the present pose.
     """
-    return _GOALS[command.task](command, knowledge, tuple(elsewhere))
+    if command.task is None:
+        return went_goal(command, knowledge)
+    task, surfaces = command.task, tuple(elsewhere)
+    found = from_page(task, "promise", lambda page: page.promise(command, knowledge, surfaces), GoalCondition, NoneType)
+    return replace(found, task=task.word) if found is not None and found.kind is GoalKind.OWN else found
 
 
 def clearing_goals(get: Command, bring: Command, knowledge: Knowledge) -> tuple[GoalCondition, GoalCondition]:
     """Goal conditions of two commands that clear a place: the place is empty, and all its objects are at the goal."""
-    source = _regions(get, knowledge, ())
+    source = regions_of(get, knowledge, ())
     place = None if bring.goal is None else knowledge.place(bring.goal)
     assert place is not None
     goal = tuple(surface_region(knowledge, name) for name in knowledge.surfaces_in(place))
@@ -75,48 +80,25 @@ def surface_region(knowledge: Knowledge, surface: str) -> Region:
     return Region(surface, facts.polygon, *heights_m, facts.viewpoints[0].pose_2d(), facts.bin)
 
 
-def _classes(item: ObjectKind | None, knowledge: Knowledge) -> tuple[str, ...]:
+def classes_of(item: ObjectKind | None, knowledge: Knowledge) -> tuple[str, ...]:
+    """Classes of a command's object."""
     assert item is not None
     return knowledge.classes(item.name)
 
 
-def _regions(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> tuple[Region, ...]:
+def regions_of(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> tuple[Region, ...]:
+    """Regions of the surfaces on which a command's object may be, and of those `elsewhere`."""
     assert command.object is not None
     place = None if command.goal is None else knowledge.place(command.goal)
     surfaces = (*surfaces_to_search(knowledge, command.object, place), *elsewhere)
     return tuple(surface_region(knowledge, name) for name in surfaces)
 
 
-def _grasped(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
-    classes, regions = _classes(command.object, knowledge), _regions(command, knowledge, elsewhere)
-    meant = in_world(() if command.object is None else command.object.relations, knowledge, command.goal)
-    count, wanted = command.object_count, str(command.object)
-    return GoalCondition(GoalKind.GRASPED, classes, count, regions, wanted=wanted, relations=meant)
-
-
-def _answered(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
-    assert command.object is not None
-    who = knowledge.somebody(command.object.name)
-    if who is not None:
-        place = None if command.goal is None else knowledge.place(command.goal)
-        rooms = tuple(Region(name, knowledge.rooms[name]) for name in knowledge.rooms_to_search(who, place))
-        person = None if who == ANYBODY else who
-        return GoalCondition(
-            GoalKind.ANSWERED, (ANYBODY,), command.object_count, rooms, person=person, wanted=str(command.object)
-        )
-    classes, regions = _classes(command.object, knowledge), _regions(command, knowledge, elsewhere)
-    place = None if command.goal is None else knowledge.place(command.goal)
-    around = [name for name in knowledge.rooms if place in (None, name)]
-    floors = tuple(Region(f"the floor of the {name}", knowledge.rooms[name], *FLOOR_M) for name in around)
-    asked, meant = str(command.object), in_world(command.object.relations, knowledge, command.goal)
-    count, floors = command.object_count, () if meant else floors
-    return GoalCondition(GoalKind.ANSWERED, classes, count, regions, wanted=asked, maybe=floors, relations=meant)
-
-
-def _carried(command: Command, knowledge: Knowledge, _: tuple[str, ...]) -> GoalCondition:
+def carried_goal(command: Command, knowledge: Knowledge) -> GoalCondition:
+    """Goal condition of a command that carries an object: it is at the goal, or a person has it."""
     item, goal = command.item or command.object, command.goal
     assert goal is not None
-    classes = _classes(item, knowledge)
+    classes = classes_of(item, knowledge)
     person = knowledge.person(goal)
     if goal == START or person is not None:
         return GoalCondition(GoalKind.HANDED_OVER, classes, command.item_count, person=person, wanted=str(item))
@@ -127,37 +109,19 @@ def _carried(command: Command, knowledge: Knowledge, _: tuple[str, ...]) -> Goal
     return GoalCondition(GoalKind.PLACED, classes, command.item_count, goal=goals, wanted=str(item), relations=where)
 
 
-def _went(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
+def went_goal(command: Command, knowledge: Knowledge) -> GoalCondition:
+    """Goal condition of going to a place or a person, with the item of the command if it has one."""
     if command.item is not None:
-        return _carried(command, knowledge, elsewhere)
+        return carried_goal(command, knowledge)
     assert command.goal is not None
     person = knowledge.person(command.goal)
     if person is not None:
-        room = _room_region(command.goal_at, knowledge)
+        room = room_region(command.goal_at, knowledge)
         return GoalCondition(GoalKind.MET, person=person, goal=room, when=When.END_OF_STEP)  # the person may walk on
     return GoalCondition(GoalKind.WENT, goal=(_place_region(knowledge, command.goal),))
 
 
-def _with_person(kind: GoalKind) -> _Goal:
-    """Returns a function from a command to its goal about a person: known or any, in the room that it names."""
-
-    def goal(command: Command, knowledge: Knowledge, _: tuple[str, ...]) -> GoalCondition | None:
-        name = "" if command.object is None else command.object.name
-        if (kind, name) == (GoalKind.GREETED, SPEAKER):
-            return None  # the speaker is unknown, and the speech is judged by itself
-        room = _room_region(None if command.goal == START else command.goal, knowledge)
-        return GoalCondition(kind, person=knowledge.person(name), goal=room, when=When.END_OF_STEP)
-
-    return goal
-
-
-def _charged(_: Command, knowledge: Knowledge, __: tuple[str, ...]) -> GoalCondition | None:
-    if knowledge.dock is None:
-        return None
-    return GoalCondition(GoalKind.WENT, goal=(square_region("the dock", knowledge.dock, POSE_NEAR_M),))
-
-
-def _room_region(place: str | None, knowledge: Knowledge) -> tuple[Region, ...]:
+def room_region(place: str | None, knowledge: Knowledge) -> tuple[Region, ...]:
     """Room of a place, as the only region; none without a known place."""
     known = None if place is None else knowledge.place(place)
     return () if known is None else (Region(room := knowledge.room(known), knowledge.rooms[room]),)
@@ -176,18 +140,3 @@ def square_region(name: str, pose: Pose, near_m: float = NEAR_M) -> Region:
     """Square region around a pose, `near_m` to each side."""
     sides = ((-near_m, -near_m), (near_m, -near_m), (near_m, near_m), (-near_m, near_m))
     return Region(name, tuple((pose.x + dx, pose.y + dy) for dx, dy in sides))
-
-
-_GOALS: Final[Mapping[Task | None, _Goal]] = MappingProxyType(
-    {
-        Task.GRASP: _grasped,
-        Task.FIND: _answered,
-        Task.PLACE: _carried,
-        Task.WAIT: lambda command, *known: None if command.goal is None else _went(command, *known),
-        Task.CHARGE: _charged,
-        Task.FOLLOW: _with_person(GoalKind.FOLLOWED),
-        Task.GUIDE: _with_person(GoalKind.GUIDED),
-        Task.GREET: _with_person(GoalKind.GREETED),
-        None: _went,
-    }
-)

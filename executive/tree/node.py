@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import import_module
@@ -19,13 +20,18 @@ from py_trees.common import Status
 from executive.tree.behaviour import ExplainedNode
 from skills.api import Cause, Skill
 from skills.inputs.errors import SourceLine
+from skills.inputs.plugins import NODES, PluginDefect, installed_plugins, run_plugin
 
 
 @cache
 def node_pages() -> tuple[ModuleType, ...]:
-    """Imports the pages of `executive.tree.nodes`."""
+    """Imports the pages of `executive.tree.nodes`, and those of plug-ins that can be imported."""
     package = import_module("executive.tree.nodes")
-    return tuple(import_module(f"{package.__name__}.{page.name}") for page in iter_modules(package.__path__))
+    pages = [import_module(f"{package.__name__}.{page.name}") for page in iter_modules(package.__path__)]
+    for entry in installed_plugins(NODES):
+        with suppress(PluginDefect):
+            pages.append(run_plugin(entry, entry.load))
+    return tuple(pages)
 
 
 @cache

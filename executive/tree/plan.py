@@ -18,7 +18,7 @@ from executive.tree.node import NodeSpec
 from executive.tree.nodes.guard import Condition
 from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.registry import missing_skill
-from executive.words.command import Command, Task
+from executive.words.command import Command
 from executive.words.expression import Value
 from executive.words.goal import GoalCondition
 from executive.words.knowledge import ANYTHING, EVERYTHING, Knowledge
@@ -348,7 +348,7 @@ class PlanBuilder:
         unnamed = self.knowledge.object_name(name) in (ANYTHING, EVERYTHING)
         if name in self.reported:
             return tuple(dict.fromkeys((*(one for one in classes if one in self.reported), name)))
-        return (ANY_OBJECT,) if unnamed and self.command.task is not Task.FIND else classes
+        return (ANY_OBJECT,) if unnamed and not self.command.looks else classes
 
     def error(self, message: str, hint: str) -> InputError:
         """Builds an error that names the step's line."""

@@ -99,11 +99,6 @@ def installed_skills() -> SkillRegistry:
     return SkillRegistry(ours, others)
 
 
-def built_in_skills() -> dict[str, SkillClass]:
-    """Returns the shipped skills by name. Raises InputError when one of them is broken."""
-    return skills_of(entry for entry in installed_plugins(GROUP) if distribution_of(entry) == OURS)
-
-
 def skills_of(entries: Iterable[EntryPoint], *, limit_s: float = LIMIT_S) -> dict[str, SkillClass]:
     """Loads and checks the skills behind entry points within a time limit; returns them by name. Raises InputError."""
     named: dict[str, tuple[EntryPoint, ...]] = {}

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any, Final
 
-from executive.record.schemas import DERIVED, JOINTS, SCAN
+from executive.words.schemas import DERIVED, JOINTS, SCAN
 
 _UNSEEN: Final = DERIVED | {JOINTS, SCAN}  # the page draws boxes from the detections themselves
 _PICTURES: Final = frozenset({"jpeg", "png"})

@@ -10,13 +10,12 @@ import asyncio
 import itertools
 import json
 import re
-import socket
 import struct
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from ipaddress import ip_address
 from operator import itemgetter
@@ -24,7 +23,7 @@ from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import urlsplit
 
 from executive.record.event_log import EventLog, LoggedMessage
-from executive.record.schemas import LIBRARY
+from executive.words.schemas import LIBRARY
 from skills.inputs.errors import InputError
 from skills.inputs.outside import json_object
 
@@ -36,6 +35,9 @@ ORIGINS: Final = ("https://app.foxglove.dev", "file://")
 """Origins of Foxglove in a browser and of its program; those of other pages are refused."""
 MOST_WAITING: Final = 1024
 """Messages that wait for a slow client; older ones are dropped."""
+MOST_BYTES: Final = 64_000_000
+"""Bytes that wait for all clients together; each has the same share, or one message."""
+USUAL_ADDRESS: Final = "127.0.0.1:8765"
 _ADDRESS: Final = re.compile(r"(?P<host>[\w.%-]+|\[[\w.:%-]+\]):(?P<port>\d{1,5})")
 _TIME_EVERY_S: Final = 0.1
 _MOST_PORT: Final = 65535
@@ -49,13 +51,27 @@ class _Client:
 
     subscriptions: dict[int, int] = field(default_factory=dict)
     control: deque[str] = field(default_factory=deque)
-    data: deque[bytes] = field(default_factory=lambda: deque(maxlen=MOST_WAITING))
+    data: deque[bytes] = field(default_factory=deque)
+    waiting_bytes: int = 0
     waker: asyncio.Event = field(default_factory=asyncio.Event)
 
-    def add(self, channel: int, stamp_ns: int, message: bytes) -> None:
+    def add(self, frame: bytes, most_bytes: int) -> None:
+        """Adds a frame; drops the oldest ones above `MOST_WAITING` or `most_bytes`."""
+        self.data.append(frame)
+        self.waiting_bytes += len(frame)
+        while len(self.data) > 1 and (len(self.data) > MOST_WAITING or self.waiting_bytes > most_bytes):
+            self.take()
+
+    def take(self) -> bytes:
+        """Removes and returns the oldest frame."""
+        frame = self.data.popleft()
+        self.waiting_bytes -= len(frame)
+        return frame
+
+    def add_message(self, channel: int, stamp_ns: int, message: bytes, most_bytes: int) -> None:
         """Adds a message if the client subscribes to its channel."""
         if (subscription := self.subscriptions.get(channel)) is not None:
-            self.data.append(struct.pack("<BIQ", _MESSAGE, subscription, stamp_ns) + message)
+            self.add(struct.pack("<BIQ", _MESSAGE, subscription, stamp_ns) + message, most_bytes)
 
 
 class LiveServer:
@@ -73,7 +89,7 @@ class LiveServer:
             raise InputError(f"--foxglove '{address[:60]}' is no address with a port", hint=hint)
         from starlette.routing import WebSocketRoute
 
-        from executive.view.serving import Server
+        from executive.view.serving import Server, open_port
 
         self._lock, self._time_s = threading.Lock(), 0.0
         self._channels: dict[tuple[str, str], dict[str, Any]] = {}
@@ -81,13 +97,11 @@ class LiveServer:
         self._clients: list[_Client] = []
         self._session = _session()
         self._host = found["host"].strip("[]")
-        family = socket.AF_INET6 if ":" in self._host else socket.AF_INET
         try:
-            opened = socket.create_server((self._host, int(found["port"])), family=family)
-        except (OSError, UnicodeError) as error:
-            why = (str(error.strerror) if isinstance(error, OSError) else "no host has this name").partition(" (")[0]
+            opened = open_port(self._host, int(found["port"]))
+        except OSError as error:
             hint = "name another, or end the program that uses it"
-            raise InputError(f"cannot serve Foxglove at {address} ({why})", hint=hint) from error
+            raise InputError(f"cannot serve Foxglove at {address} ({error.strerror})", hint=hint) from error
         self.url = f"ws://{found['host']}:{opened.getsockname()[1]}"
         self._server = Server([WebSocketRoute("/", self._serve)], opened, ws_per_message_deflate=False)
 
@@ -116,9 +130,14 @@ class LiveServer:
             self._newest.setdefault(channel["id"], {})[about] = message.data, stamp_ns
             for client in self._clients:
                 if is_due:
-                    client.data.append(struct.pack("<BQ", _TIME, stamp_ns))
-                client.add(channel["id"], stamp_ns, message.data)
+                    client.add(struct.pack("<BQ", _TIME, stamp_ns), self._share)
+                client.add_message(channel["id"], stamp_ns, message.data, self._share)
         self._wake()
+
+    @property
+    def _share(self) -> int:
+        """Bytes that may wait for one client."""
+        return MOST_BYTES // max(len(self._clients), 1)
 
     def _tell_all(self, text: str) -> None:
         for client in self._clients:
@@ -164,7 +183,9 @@ class LiveServer:
                     if client.control:
                         await websocket.send_text(client.control.popleft())
                     else:
-                        await websocket.send_bytes(client.data.popleft())
+                        with self._lock:
+                            frame = client.take()
+                        await websocket.send_bytes(frame)
                 await client.waker.wait()
         except (WebSocketDisconnect, RuntimeError, OSError):
             pass  # the client has disconnected
@@ -190,7 +211,7 @@ class LiveServer:
             if channel in (known["id"] for known in self._channels.values()):
                 client.subscriptions[channel] = subscription
                 for data, stamp_ns in sorted(self._newest.get(channel, {}).values(), key=itemgetter(1)):
-                    client.add(channel, stamp_ns, data)
+                    client.add_message(channel, stamp_ns, data, self._share)
         client.waker.set()
 
 
@@ -209,17 +230,3 @@ def _channel(number: int, message: LoggedMessage) -> dict[str, Any]:
 
 def _advertise(channels: Iterable[Mapping[str, Any]]) -> str:
     return json.dumps({"op": "advertise", "channels": [*channels]})
-
-
-@contextmanager
-def serve_live(address: str | None, tell: Callable[[str], None]) -> Iterator[LiveServer | None]:
-    """Serves while the block runs, and shows the address; serves nothing without an address. Raises InputError."""
-    if address is None:
-        yield None
-        return
-    server = LiveServer(address)
-    tell(f"Foxglove: {server.url}")
-    try:
-        yield server
-    finally:
-        server.close()

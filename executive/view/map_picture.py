@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.record.history import Event
-from executive.record.schemas import DOORS, MAP, NAVIGATION, PATH, POSE, RESERVED_PATH, TREE
 from executive.view.text import ROBOT_COLOURS, rgb_of
+from executive.words.schemas import DOORS, MAP, NAVIGATION, PATH, POSE, RESERVED_PATH, TREE
 from skills.inputs.errors import InputError
 from skills.map_drawing import ZONE_COLOURS, Names, draw_zone, with_legend
 
 WIDTH_PX: Final = 1400
+_POSE_PX: Final = 18.0
 FOOTPRINT_M: Final = (1.1, 0.5)
 _CELL_M: Final = 0.05
 _TRAIL: Final = (120, 158, 0)
@@ -29,6 +30,7 @@ _OBSTACLE: Final = (0, 94, 213)
 _ROBOT: Final = (233, 180, 86)
 _INK: Final = (40, 40, 40)
 _DOCK: Final = (0, 190, 255)
+_OPEN: Final = (30, 74, 122)
 _LEGEND: Final = (
     ("path driven", _TRAIL),
     ("path planned", _PLAN),
@@ -38,7 +40,7 @@ _LEGEND: Final = (
 Colour = tuple[int, int, int]
 _DOORS: Final[Mapping[str, tuple[Colour, str]]] = {
     "closed": ((40, 30, 200), "closed door"),
-    "open": (_TRAIL, "open door"),
+    "open": (_OPEN, "open door"),
     "unknown": ((150, 150, 150), "door not seen"),
 }
 
@@ -107,7 +109,7 @@ def _write_names(
     poses: Sequence[Mapping[str, Any]],
     zones: Sequence[Mapping[str, Any]],
 ) -> None:
-    """Draws the dock and, above all else, the names of robots, dock, places and other zones."""
+    """Draws the dock, named poses and, above all else, the names of robots, dock, places and other zones."""
     driven: dict[str, list[tuple[float, float]]] = {}
     for pose in poses:
         driven.setdefault(pose["robot"], []).append(_position(pose))
@@ -124,7 +126,14 @@ def _write_names(
         names.write("dock", pixel.tolist())
     for name, line in lines.items():
         names.write(name, line[-1].tolist())
-    written = {place["name"]: (place["x"], place["y"]) for place in data.get("places", ())}
+    places = data.get("places", ())
+    for place in (each for each in places if "yaw_rad" in each):
+        at, yaw = frame.pixels([(place["x"], place["y"])])[0], place["yaw_rad"]
+        ahead = np.round(at + _POSE_PX * np.array([math.cos(yaw), -math.sin(yaw)])).astype(int)
+        cv2.line(picture, at.tolist(), ahead.tolist(), _INK, 3, cv2.LINE_AA)
+        cv2.circle(picture, at.tolist(), 6, _INK, cv2.FILLED, cv2.LINE_AA)
+        names.keep_clear(at.tolist(), _POSE_PX)
+    written = {place["name"]: (place["x"], place["y"]) for place in places}
     for zone in zones:
         written.setdefault(zone["name"], np.mean(zone["outlines"][0], axis=0).tolist())
     for name, middle in written.items():

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.record.history import Event
-from executive.record.schemas import STATE, TRUTH, WALL
 from executive.view.html import render
 from executive.view.text import ROBOT_COLOURS
+from executive.words.schemas import STATE, TRUTH, WALL
 
 _CURVES: Final[Mapping[str, tuple[str, str, float]]] = {
     "speed_m_s": ("Speed", "m/s", 1.0),

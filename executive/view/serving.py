@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import logging
 import secrets
 import socket
@@ -28,6 +29,8 @@ STRANGER_S: Final = 10.0
 BODY_S: Final = 10.0
 CLOSE_S: Final = 2.0
 MOST_ERRORS: Final = 20
+_ALL: Final = ("0.0.0.0", "::")
+"""Hosts that mean all addresses of this machine."""
 _LOG: Final = logging.getLogger("uvicorn.error")
 
 
@@ -68,12 +71,19 @@ def trust(connection: HTTPConnection) -> None:
 
 
 def open_port(host: str, port: int) -> socket.socket:
-    """Opens a port of an address of this machine. Raises OSError if there is no such address, or the port is taken."""
+    """Opens a port of an address of this machine.
+
+    Raises OSError if there is no such address, the port is taken, or a host such as "" means all addresses unsaid.
+    """
     try:
-        return socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
+        opened = socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET)
     except (OSError, TypeError, ValueError) as error:
         why = getattr(error, "strerror", None) or "no host has this name"
         raise OSError(getattr(error, "errno", None), why.partition(" (while")[0]) from error
+    if opened.getsockname()[0] in _ALL and host not in _ALL:
+        opened.close()
+        raise OSError(errno.EADDRNOTAVAIL, f"'{host}' would open all addresses; write {_ALL[0]} for that")
+    return opened
 
 
 def url_of(host: str, port: int) -> str:
@@ -192,6 +202,9 @@ class CallServer(Server):
             said = {"error": "the token is missing or wrong: send 'Authorization: Bearer TOKEN'"}
             return JSONResponse(said, HTTPStatus.UNAUTHORIZED, {"WWW-Authenticate": "Bearer"})
         trust(request)
+        if request.url.query:
+            said = {"error": "values belong into the body, as JSON: leave out all from '?' on, and send them there"}
+            return JSONResponse(said, HTTPStatus.BAD_REQUEST, {"Connection": "close"})
         body = await body_of(request)
         if body is None:
             said = {"error": f"the body is too large or comes too slowly: send {BODY_LIMITS}"}

@@ -7,12 +7,12 @@ follow the name: "[hammer next to the wrench, 2nd from the left]".
 
 from __future__ import annotations
 
-import enum
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from executive.words.task import NOTHING, Part, Task, task_named
 from skills.api import ObjectKind
 from skills.relations import ORDERS, PARTS, Landmark, Relation, RelationKind
 
@@ -23,7 +23,6 @@ _ATTRIBUTE: Final = re.compile(
     r"|clean|dirty|new|old|hot|cold|warm|fresh|wooden|plastic|metal|other|same|left|right|\w{3,}est",
     re.IGNORECASE,
 )
-_NOTHING: Final = "Nothing"
 START: Final = "start"
 """Goal at the pose where the robot stood when the speaker addressed it."""
 SPEAKER: Final = "speaker"
@@ -39,23 +38,6 @@ _COUNTED: Final = re.compile(r'(?:(\d+|some) )?(?:([^"]*) )?(?:"([^"]+)"|([^"]+)
 _RELATION: Final = re.compile(
     rf'"[^"]*"|,? (?:(\d+)(?:st|nd|rd|th) )?({"|".join(kind.value for kind in RelationKind)})(?=,|$| the | [A-Z])'
 )
-
-
-class Task(enum.Enum):
-    """Task of a command at its goal. WAIT has a time as its object, FOLLOW, GUIDE and GREET a person, CHARGE none."""
-
-    GRASP = "grasp"
-    FIND = "find"
-    PLACE = "place"
-    WAIT = "wait"
-    CHARGE = "charge"
-    FOLLOW = "follow"  # until the person stands at the goal, or until told
-    GUIDE = "guide"
-    GREET = "greet"  # of an open number of people: each person at the goal once
-
-
-PEOPLE_TASKS: Final = frozenset({Task.FOLLOW, Task.GUIDE, Task.GREET})
-"""Tasks whose object is a person."""
 
 
 @dataclass(frozen=True)
@@ -85,14 +67,14 @@ class Command:
                 raise ValueError(f"{name!r} cannot be a name in a command")
         for kind, count in ((self.item, self.item_count), (self.object, self.object_count)):
             if count < 0 or (kind is None and count != 1):
-                raise ValueError(f"{count} cannot be the count of {kind or _NOTHING}")
+                raise ValueError(f"{count} cannot be the count of {kind or NOTHING}")
             landmarks = () if kind is None else tuple(one for each in kind.relations for one in each.landmarks)
             described = () if kind is None else (kind.attributes, *(one.attributes for one in landmarks))
             if not all(may_be_attribute(word) for words in described for word in words):
                 raise ValueError(f"{kind} has an attribute that is no single word, or a number")
         if (self.goal_at is not None or self.goal_relations) and self.goal is None:
             raise ValueError(f"a goal is missing at {self.goal_at or self.goal_relations[0]!s}")
-        if self.goal_relations and (self.goal_at is not None or self.goal == _NOTHING):
+        if self.goal_relations and (self.goal_at is not None or self.goal == NOTHING):
             raise ValueError(f"'{self.goal_relations[0]}' goes with a surface")
         for relations in (self.goal_relations, *(each.relations for each in (self.item, self.object) if each)):
             kinds = [next((group for group in (PARTS, ORDERS) if one.kind in group), one.kind) for one in relations]
@@ -102,9 +84,34 @@ class Command:
     def __str__(self) -> str:
         """Text form, for instance "Take [Nothing] to [kitchen] and do [grasp] to [drink]"."""
         item = _counted_text(self.item, self.item_count)
-        task = _NOTHING if self.task is None else self.task.value
+        task = NOTHING if self.task is None else self.task.word
         target = _counted_text(self.object, self.object_count)
         return f"Take [{item}] to [{_goal_text(self)}] and do [{task}] to [{target}]"
+
+    @property
+    def takes(self) -> bool:
+        """Returns whether the robot takes hold of the object."""
+        return self.task is not None and self.task.takes
+
+    @property
+    def puts(self) -> bool:
+        """Returns whether the robot puts the object down."""
+        return self.task is not None and self.task.puts
+
+    @property
+    def looks(self) -> bool:
+        """Returns whether the robot looks for the object, and answers."""
+        return self.task is not None and self.task.looks
+
+    @property
+    def about_person(self) -> bool:
+        """Returns whether the object is a person."""
+        return self.task is not None and self.task.object_is is Part.PERSON
+
+    @property
+    def carried(self) -> ObjectKind | None:
+        """Object that the robot carries; None if it carries none."""
+        return self.object if self.puts and self.item is None else self.item
 
     def to_json(self) -> dict[str, Any]:
         """Returns the command as JSON values: names as text, and null for Nothing, with count 0."""
@@ -112,7 +119,7 @@ class Command:
             "item": None if self.item is None else str(self.item),
             "goal": self.goal and " ".join((self.goal, *map(str, self.goal_relations))),
             "goal_at": self.goal_at,
-            "task": None if self.task is None else self.task.value,
+            "task": None if self.task is None else self.task.word,
             "object": None if self.object is None else str(self.object),
             "item_count": 0 if self.item is None else self.item_count,
             "object_count": 0 if self.object is None else self.object_count,
@@ -150,7 +157,7 @@ def parse_command(text: str) -> Command:
     target_kind, target_count = _parse_counted(target)
     place, relations = split_relations(goal)
     goal_name, goal_at = _parse_goal(place)
-    tasks = _parse_task(task), target_kind, item_count, target_count
+    tasks = None if task == NOTHING else task_named(task), target_kind, item_count, target_count
     return Command(item_kind, goal_name, goal_at, *tasks, goal_relations=relations)
 
 
@@ -159,15 +166,15 @@ def parts_of_command(command: Command) -> dict[str, str]:
     parts = {
         "take": _counted_text(command.item, command.item_count),
         "to": _goal_text(command),
-        "do": _NOTHING if command.task is None else command.task.value,
+        "do": NOTHING if command.task is None else command.task.word,
         "object": _counted_text(command.object, command.object_count),
     }
-    return {key: text for key, text in parts.items() if text != _NOTHING}
+    return {key: text for key, text in parts.items() if text != NOTHING}
 
 
 def command_of_parts(parts: Mapping[str, str | None]) -> Command:
     """Builds a command from its parts. Raises ValueError when a part cannot be parsed."""
-    take, to, do, target = (parts.get(key) or _NOTHING for key in ("take", "to", "do", "object"))
+    take, to, do, target = (parts.get(key) or NOTHING for key in ("take", "to", "do", "object"))
     return parse_command(f"Take [{take}] to [{to}] and do [{do}] to [{target}]")
 
 
@@ -225,7 +232,7 @@ def split_relations(text: str) -> tuple[str, tuple[Relation, ...]]:
 def _counted_text(of: ObjectKind | None, count: int) -> str:
     """Text between the brackets; in quotes if it would not parse back to the same object."""
     if of is None:
-        return _NOTHING
+        return NOTHING
     number = {0: f"{_PLURAL} ", 1: ""}.get(count, f"{count} ")
     plain = f"{number}{of.plain}"
     parses = not _has_relation(plain) and plain[-1] != "," and _parse_counted(plain) == (of.plain, count)
@@ -233,7 +240,7 @@ def _counted_text(of: ObjectKind | None, count: int) -> str:
 
 
 def _parse_counted(text: str) -> tuple[ObjectKind | None, int]:
-    if text == _NOTHING:
+    if text == NOTHING:
         return None, 1
     words, relations = split_relations(text)
     match = _COUNTED.fullmatch(words)
@@ -248,29 +255,19 @@ def _parse_counted(text: str) -> tuple[ObjectKind | None, int]:
 
 def _goal_text(command: Command) -> str:
     if command.goal is None:
-        return _NOTHING
+        return NOTHING
     name, at = _quoted_place(command.goal), command.goal_at
     return related(name, command.goal_relations) if at is None else f"{name} at {_quoted_place(at)}"
 
 
 def _quoted_place(name: str) -> str:
-    is_plain = name != _NOTHING and name[-1] != "," and " at " not in f" {name} " and not _has_relation(f"at {name}")
+    is_plain = name != NOTHING and name[-1] != "," and " at " not in f" {name} " and not _has_relation(f"at {name}")
     return name if is_plain else f'"{name}"'
 
 
 def _parse_goal(text: str) -> tuple[str | None, str | None]:
     match = _GOAL.fullmatch(text)
-    if text == _NOTHING or match is None:
+    if text == NOTHING or match is None:
         return None, None
     goal, goal_at = match.groups()
     return goal.strip('"'), goal_at.strip('"') if goal_at else None
-
-
-def _parse_task(text: str) -> Task | None:
-    if text == _NOTHING:
-        return None
-    try:
-        return Task(text)
-    except ValueError as error:
-        known = ", ".join(task.value for task in Task)
-        raise ValueError(f"[{text}] is no task; known are {known} and {_NOTHING}") from error

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Union
 from pydantic import BeforeValidator, Field, WrapValidator
 from typing_extensions import TypeAliasType
 
-from executive.words.command import Command, Task, command_of_parts, parts_of_command
+from executive.words.command import Command, command_of_parts, parts_of_command
 from executive.words.expression import Expression, Kind
 from executive.words.forms import Forms
 from executive.words.phrase import ObjectWords, written
+from executive.words.task import basic
 from skills.inputs.errors import listing
 from skills.inputs.schema import Name, Strict, Text
 from skills.quantities import Delay, Quantity, Share
@@ -97,7 +98,7 @@ class Look(_Looking):
     @cached_property
     def command(self) -> Command:
         """Command to find the object. Raises ValueError when a name cannot be parsed."""
-        return command_of_parts({"do": Task.FIND.value, "object": str(self.object), "to": self.at})
+        return command_of_parts({"do": basic().look.word, "object": str(self.object), "to": self.at})
 
     def __str__(self) -> str:
         at = "" if self.command.goal is None else f" at {self.command.goal}"

@@ -57,11 +57,15 @@ def kind_of(type_or_value: Any) -> Kind:
 
 @dataclass(frozen=True)
 class _Function:
-    """Named function: the kinds of its arguments (None: one or more numbers), the kind of its result, and its body."""
+    """Named function: the kinds of its arguments (None: one or more numbers), the kind of its result, and its body.
+
+    `instead` says what to write for a call with more arguments, as other languages take them.
+    """
 
     takes: tuple[Kind, ...] | None
     returns: Kind
     body: Callable[..., Value]
+    instead: str = ""
 
 
 FUNCTIONS: Final[Mapping[str, _Function]] = MappingProxyType(
@@ -69,7 +73,7 @@ FUNCTIONS: Final[Mapping[str, _Function]] = MappingProxyType(
         "abs": _Function((Kind.NUMBER,), Kind.NUMBER, abs),
         "min": _Function(None, Kind.NUMBER, lambda *numbers: min(numbers)),
         "max": _Function(None, Kind.NUMBER, lambda *numbers: max(numbers)),
-        "round": _Function((Kind.NUMBER,), Kind.NUMBER, round),
+        "round": _Function((Kind.NUMBER,), Kind.NUMBER, round, "for one decimal, write round(x * 10) / 10"),
         "length": _Function((Kind.TEXT,), Kind.NUMBER, len),
         "lower": _Function((Kind.TEXT,), Kind.TEXT, str.lower),
     }
@@ -286,7 +290,7 @@ def _kind(node: ast.expr, kinds: Mapping[str, Kind]) -> Kind:
             _want({_kind(orelse, kinds)}, first, node)
             return first
         case ast.Call(ast.Name(name), arguments):
-            return _call(node, FUNCTIONS[name], [_kind(each, kinds) for each in arguments])
+            return _call(node, name, [_kind(each, kinds) for each in arguments])
     raise ExpressionError(f"'{_shown(node, 40)}' cannot stand in an expression", _HINT)
 
 
@@ -328,11 +332,13 @@ def _text_hint(node: ast.Compare) -> str:
     return next((hint for text in texts if (hint := slip_hint(text))), next(numbers, ""))
 
 
-def _call(node: ast.expr, function: _Function, kinds: list[Kind]) -> Kind:
+def _call(node: ast.expr, name: str, kinds: list[Kind]) -> Kind:
+    function = FUNCTIONS[name]
     wanted = [Kind.NUMBER] * max(1, len(kinds)) if function.takes is None else list(function.takes)
     if kinds != wanted:
-        arguments = "one or more numbers" if function.takes is None else " and ".join(map(str, wanted))
-        raise ExpressionError(f"the function of '{_shown(node, 60)}' takes {arguments}", f"give it {arguments}")
+        takes = "one or more numbers" if function.takes is None else f"one {' and one '.join(map(str, wanted))}"
+        hint = function.instead if len(kinds) > len(wanted) else ""
+        raise ExpressionError(f"{name}() takes {takes}, unlike '{_shown(node, 60)}'", hint or f"give it {takes}")
     return function.returns
 
 

@@ -20,11 +20,9 @@ class GoalKind(enum.Enum):
     DOOR_OPEN = "door open"  # the answer is whether the door in the source region is open (`wanted` "closed": closed)
     DOOR_OPENED = "door opened"  # the door in the source region is open
     CLEARED = "cleared"  # nothing rests in the source regions; with goal regions, all that did rests there, let go
-    FOLLOWED = "followed"  # the robot is near the person, who stands in a goal region, and never lost them for long
-    GUIDED = "guided"  # the person stands in a goal region, and the robot near them
     MET = "met"  # the robot is close to the person
     PICTURED = "pictured"  # pictures show the middle of a goal region or an object of a class, from a source region
-    GREETED = "greeted"  # the robot spoke once beside each person who stood in the goal regions
+    OWN = "own"  # what the page of the task `task` judges
 
 
 class When(enum.Enum):
@@ -70,10 +68,10 @@ class GoalCondition:
     classes), and `count` the number of objects (0 counts as 1). The robot takes the objects from `source` (empty:
     anywhere) or, for an answer, looks there; an answer may count or miss objects in `maybe`. `goal` is the destination
     of the objects or of the robot (any of the regions). `person` receives the object or, if the class is "person", is
-    searched for (None: anyone). To follow, guide, meet or greet a person, `person` (None: anyone) must stand in `goal`
-    (empty: anywhere). `answer` is the answer that the robot gave at `answered_s` (None: now), `spoken_s` has the times
-    at which it spoke. `robot` must act (None: any). `relations` say which objects of the source are meant, or for
-    PLACED where in the goal.
+    searched for (None: anyone); to be met, `person` must stand in `goal` (empty: anywhere). `task` is the word of the
+    task whose page judges an OWN condition, for which `spoken_s` has the times at which the robot spoke, and `said`
+    what it said. `answer` is the answer that the robot gave at `answered_s` (None: now). `robot` must act (None: any).
+    `relations` say which objects of the source are meant, or for PLACED where in the goal.
 
     `when` says at which times the condition must hold. The step ran from `began_s` (None: since `since_s`) to `ended_s`
     (None: it ends now). A later step of the same mission may lift the objects again within the intervals `taken_s`.
@@ -90,6 +88,7 @@ class GoalCondition:
     answer: bool | None = None
     answered_s: float | None = None
     spoken_s: tuple[float, ...] = ()
+    said: tuple[str, ...] = ()
     robot: str | None = None
     wanted: str = ""
     when: When = When.END_OF_MISSION
@@ -98,6 +97,7 @@ class GoalCondition:
     taken_s: tuple[tuple[float, float], ...] = ()
     since_s: float = 0.0
     relations: tuple[Relation, ...] = ()
+    task: str = ""
 
     @property
     def from_s(self) -> float:

@@ -28,7 +28,7 @@ def from_text(text: str) -> Any:
     """Converts a text written by `to_text` back. Raises ValueError for a damaged text, and for an unknown class."""
     try:
         return unpack(json.loads(text))
-    except (KeyError, TypeError, AttributeError) as error:
+    except (KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ValueError(f"no value can be read from {text[:80]!r} ({error})") from error
 
 

@@ -11,9 +11,9 @@ from typing import Annotated, Any, Final
 
 from pydantic import Field, model_validator
 
-from executive.words.command import Task
-from executive.words.outlines import Corner, Polygon, distance_m
-from executive.words.robot_config import RobotsFile
+from executive.words.outlines import Corner, Polygon, distance_m, unless_near
+from executive.words.robot_config import RobotsFile, check_name
+from executive.words.task import Task, basic, installed_tasks
 from executive.words.zone import ZoneFacts, with_files
 from skills.api import Surface, Tag, Zone
 from skills.class_forms import ANY_OBJECT, class_forms
@@ -276,7 +276,7 @@ class Knowledge(Strict):
         if it has no entry, the room where the objects usually are is taken.
         """
         words = [name, *(category for c in self.classes(name) for category in self.things[c].categories)]
-        tables = [self.defaults.get(t.value, {}) for t in (task, Task.GRASP) if t is not None]
+        tables = [self.defaults.get(t.word, {}) for t in (task, basic().take) if t is not None]
         said = next((table[word] for table in tables for word in words if word in table), None)
         return said or next((self.room(surface) for surface in self.usual_surfaces(name)), None)
 
@@ -376,12 +376,26 @@ def with_own_objects(knowledge: Knowledge, own: Iterable[str]) -> Knowledge:
 
 def _cross_errors(knowledge: Knowledge, source: YamlSource, own: Collection[str]) -> Iterator[InputError]:
     """Yields errors in references between sections of the file."""
-    tasks = [task.value for task in Task]
+    tasks, rooms = [*installed_tasks()], knowledge.rooms
+    for name in (knowledge.robot.name, *knowledge.robot.others):
+        try:
+            check_name(name)
+        except InputError as error:
+            yield source.error(("robot",), error.message, error.hint)
     for index, door in enumerate(knowledge.doors):
         for side, room in enumerate(door.between):
-            yield from _unless_known(source, ("doors", index, "between", side), room, knowledge.rooms)
+            yield from _unless_known(source, ("doors", index, "between", side), room, rooms)
+            yield from unless_near(source, ("doors", index, "at"), door.at, room, rooms.get(room))
+        if len(set(door.between)) == 1:
+            what = f"this door has {door.between[0]!r} on both sides"
+            yield source.error(("doors", index, "between"), what, "name the two rooms that it joins")
     for name, surface in knowledge.surfaces.items():
-        yield from _unless_known(source, ("surfaces", name, "place"), surface.place, knowledge.rooms)
+        yield from _unless_known(source, ("surfaces", name, "place"), surface.place, rooms)
+        at, corner = ("surfaces", name, "polygon"), surface.polygon[0]
+        yield from unless_near(source, at, corner, surface.place, rooms.get(surface.place))
+        for index, pose in enumerate(surface.viewpoints):
+            seen_from = ("surfaces", name, "viewpoints", index)
+            yield from unless_near(source, seen_from, (pose.x, pose.y), name, surface.polygon)
     for name, zone in knowledge.zones.items():
         if zone.place is not None:
             yield from _unless_known(source, ("zones", name, "place"), zone.place, knowledge.rooms)

@@ -16,13 +16,14 @@ from pydantic import (
     model_validator,
 )
 
-from executive.words.command import Command, Task, command_of_parts, parts_of_command
+from executive.words.command import Command, command_of_parts, parts_of_command
 from executive.words.condition import Condition, DoorOpen
 from executive.words.expression import Expression, Template, literal
 from executive.words.phrase import Goal, ObjectWords, written
 from executive.words.step import Fault, Scalar, Step, unreadable
+from executive.words.task import Part, Task
 from skills.inputs.schema import Name, Strict, Text
-from skills.quantities import Duration, Share, clock_text
+from skills.quantities import Duration, QuantityError, Share, clock_text
 
 COMMAND_KEYS: Final = ("take", "to", "do", "object")
 _ELSEWHERE: Final = (
@@ -69,8 +70,10 @@ class Do(Step):
 
     @model_validator(mode="after")
     def _is_a_command(self) -> Self:
-        if self.do is not Task.CHARGE and (self.do is None) != (self.object is None):
-            raise ValueError("'do' and 'object' go together")
+        lacks = self.do is not None and self.do.object_is is not Part.NOTHING and self.object is None
+        if lacks or (self.object is not None and self.do is None):
+            about = "" if self.do is None else f"'{self.do.word}' needs its object, a {self.do.object_is.value}"
+            raise QuantityError("'do' and 'object' go together", about or "say with 'do' what is done to it")
         if self.gives is not None and self.do is None:
             raise ValueError("'gives' goes with 'skill', 'ask', 'check', 'say' or 'do'")
         return self
@@ -92,7 +95,7 @@ class Do(Step):
     @functools.cached_property
     def command(self) -> Command:
         """Command of the step. Raises ValueError when a part cannot be parsed."""
-        do = None if self.do is None else self.do.value
+        do = None if self.do is None else self.do.word
         parts = {"take": self.take, "to": self.to, "do": do, "object": self.object}
         return command_of_parts({key: None if each is None else str(each) for key, each in parts.items()})
 

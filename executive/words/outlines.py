@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 from pydantic import Field
 
+from skills.inputs.errors import InputError
+from skills.inputs.yaml_source import KeyPath, YamlSource
 from skills.quantities import Coordinate
 
 if TYPE_CHECKING:
@@ -20,6 +22,8 @@ Corner = tuple[Coordinate, Coordinate]
 """Corner of an outline in a file."""
 Polygon = Annotated[tuple[Corner, ...], Field(min_length=3)]
 """Outline in a file."""
+_NEAR_M: Final = 4.0
+"""Distance of doors and surfaces from their rooms, and of viewpoints from their surfaces, at most."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,15 @@ def distance_m(polygon: Sequence[Point], point: Point) -> float:
     import shapely
 
     return float(shapely.distance(_outline(tuple(polygon)), shapely.Point(point)))
+
+
+def unless_near(
+    source: YamlSource, path: KeyPath, at: Point, name: str, outline: Sequence[Point] | None
+) -> Iterator[InputError]:
+    """Yields an error for a point that is far from an outline."""
+    if outline is not None and (off_m := distance_m(outline, at)) > _NEAR_M:
+        what = f"({at[0]:g}, {at[1]:g}) is {off_m:.1f} m from the {name}"
+        yield source.error(path, what, f"correct it; {_NEAR_M:g} m at most")
 
 
 def fits(outline: Sequence[Point], polygon: Sequence[Point], taken: Iterable[Sequence[Point]]) -> bool:

@@ -104,7 +104,10 @@ def check_name(name: str) -> str:
     if not name:
         raise InputError("a robot without a name", hint=_FORM)
     if not _NAME.fullmatch(name) or not name_key(name).strip():
-        raise InputError(f"'{name[:60]}' is no name for a robot", hint="begin it with a letter, as in 'alice'")
+        raise InputError(
+            f"'{name[:60]}' is no name for a robot",
+            hint="write a letter, then letters, digits, spaces, dots, dashes and apostrophes, as in 'alice'",
+        )
     if name_key(name) in EVERYBODY:
         raise InputError(f"'{name}' means all robots, so no robot can have that name", hint="give it another name")
     return name

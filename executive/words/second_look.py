@@ -11,11 +11,12 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
-from executive.words.command import START, Command, Task
+from executive.words.command import START, Command
 from executive.words.knowledge import NUMBERS, Knowledge
 from executive.words.leaf_steps import Dock, Picture, Speak, Wait
 from executive.words.step import Step
 from executive.words.steps import steps_to_yaml
+from executive.words.task import basic, installed_tasks
 from skills.inputs.yaml_source import read_yaml
 
 _CLAUSE: Final = re.compile(r"[,;.!?:]|\b(?:and|but|then|so)\b", re.IGNORECASE)
@@ -32,13 +33,14 @@ def second_look(text: str, steps: Sequence[Step], knowledge: Knowledge, *, robot
     marks = (*_marks(walked, knowledge), *["<robots>"] * robots)
     mission = "\n".join((*steps_to_yaml(steps), *map(str, commands), *marks))
     named = {"people": knowledge.people, "things": (*knowledge.object_names(), "thing", "object")}
-    spelled = {f"<{key}>": f"(?:{_any_of(knowledge.spellings(each))})" for key, each in named.items()}
+    spelled = {f"<{key}>": f"(?:{_any_of(knowledge.spellings(each))})" for key, each in named.items()} | _tasks()
     for row in _table()["rows"]:
         form = reduce(lambda text, key: text.replace(key, spelled[key]), spelled, row["cue"])
         cues = rf"(?<!\w)(?:{form})\b"
         left = 0
         for cue in re.finditer(cues, raw if row.get("raw") else heard, re.IGNORECASE):
-            carried = reduce(lambda text, part: text.replace(*part), _parts(cue, knowledge), row["carried"])
+            parts = (*_tasks().items(), *_parts(cue, knowledge))
+            carried = reduce(lambda text, part: text.replace(*part), parts, row["carried"])
             following = "<next apart>" in row["carried"]
             looks = following or "<apart>" in row["carried"]
             if looks and _is_apart(heard, cue, commands, knowledge, following=following):
@@ -64,6 +66,13 @@ def _table() -> Any:
     return read_yaml(Path(__file__).with_name("cues.yaml")).data
 
 
+def _tasks() -> dict[str, str]:
+    """Words of tasks for the table, by their marks."""
+    tasks = installed_tasks().values()
+    other = [task.word for task in tasks if not (task.takes or task.puts or task.looks)]
+    return {"<tasks>": _any_of(other), "<moving>": _any_of(task.word for task in tasks if task.moves)}
+
+
 def _any_of(phrases: Iterable[str]) -> str:
     return "|".join(map(re.escape, sorted(phrases, key=len, reverse=True))) or "(?!)"
 
@@ -72,22 +81,23 @@ def _marks(walked: Sequence[Step], knowledge: Knowledge) -> Iterator[str]:
     """Yields what the table says of a mission in angle brackets: what is done, what is not, and how many are taken."""
     commands = [command for each in walked for command in each.commands]
     taken = [command for command in commands if command.item is not None]
-    visits = {command.goal for command in commands if command.item is None and command.task is not Task.GRASP}
-    acts = sum(isinstance(each, Speak | Picture | Dock) for each in walked) + len(taken) + len(visits)
+    own = {command for command in commands if command.task is not None and command.task.sentences}
+    visits = {command.goal for command in commands if command.item is None and not command.takes and command not in own}
+    acts = sum(isinstance(each, Speak | Picture | Dock) for each in walked) + len(taken) + len(own) + len(visits)
     if acts > 1:
         yield "<several>"
     if taken:
         yield "<takes>"
-    if all(command.goal in knowledge.tops for command in commands if command.task is Task.GRASP):
+    if all(command.goal in knowledge.tops for command in commands if command.takes):
         yield "<from a surface>"
-    if not any(gets.task is Task.GRASP and gets.goal == brings.goal for gets, brings in pairwise(commands)):
+    if not any(gets.takes and gets.goal == brings.goal for gets, brings in pairwise(commands)):
         yield "<moves>"
     yield from (f"<{n} taken>" for n in range(1, 1 + sum(command.item_count for command in taken)))
-    done = {command.task.value for command in commands if command.task is not None}
-    done |= {"grasp"} if taken else set()
-    kinds = {Speak: "speak", Wait: "wait", Dock: "charge"}
+    done = {command.task.word for command in commands if command.task is not None}
+    done |= {basic().take.word} if taken else set()
+    kinds = {Speak: "speak", Wait: basic().wait.word, Dock: basic().charge.word}
     done |= {act for kind, act in kinds.items() if any(isinstance(each, kind) for each in walked)}
-    yield from (f"<NO {act.upper()}>" for act in ({task.value for task in Task} | {"speak"}) - done)
+    yield from (f"<NO {act.upper()}>" for act in ({*installed_tasks()} | {"speak"}) - done)
 
 
 def _is_apart(

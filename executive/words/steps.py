@@ -42,11 +42,12 @@ from executive.words.leaf_steps import (
     steps_of_commands,
 )
 from executive.words.step import Fault, Scalar, Step, unreadable
+from executive.words.task import Part, installed_tasks
 from executive.words.zone import ZONES, Zones
 from skills.inputs.errors import InputError, listing
 from skills.inputs.schema import Name, Strict, Text
 from skills.inputs.yaml_source import parse_yaml, yaml_of
-from skills.quantities import Count, Duration
+from skills.quantities import Count, Duration, QuantityError
 
 
 def _none_is_empty(value: Any, handler: ValidatorFunctionWrapHandler) -> Any:
@@ -334,6 +335,8 @@ def _refused(keys: Sequence[str]) -> str:
     return f"a step has either '{keys[0]}' or {listing(keys[1:])}, not both"
 
 
+STEP_KEYS: Final = frozenset(_KEYS)
+"""Keys that select what a step is; a task of such a word has no short form."""
 _FORMS: Final = Forms(_KEYS, _refused)
 
 
@@ -343,9 +346,38 @@ def _read(data: Any) -> Any:
         data = {**({} if data == "dock" else data), "dock": {}}
     if isinstance(data, ForEach):
         return data
+    if isinstance(data, Mapping):
+        data = _as_command(data)
     if isinstance(data, Mapping) and isinstance(data.get("repeat"), Mapping) and "for_each" in data["repeat"]:
         return Forms({**_KEYS, "repeat": ForEach}, _refused).read(data)
     return _FORMS.read(data)
+
+
+_PARTS: Final = MappingProxyType({"task": "do", "item": "take", "goal": "to", "object": "object"})
+"""Parts of a command as a task names them, with the keys of a step."""
+
+
+def _as_command(data: Mapping[Any, Any]) -> Mapping[Any, Any]:
+    """Writes `do: {task: vacuum, goal: kitchen}` and `vacuum: kitchen` as the parts of a command.
+
+    The text of the short form is the task's object, or its goal when the task has no object.
+    """
+    words = [key for key in data if key in installed_tasks() and key not in _KEYS]
+    said = {key: value for key, value in data.items() if key not in words and key != "do"}
+    if len(words) == 1 and "do" not in data:
+        (word,) = words
+        task = installed_tasks()[word]
+        main, kind = ("goal", task.goal_is) if task.object_is is Part.NOTHING else ("object", task.object_is)
+        if not isinstance(data[word], Mapping | None if kind is Part.NOTHING else str | Mapping | None):
+            how = "leave its value out" if kind is Part.NOTHING else "write it as a text, in quotes"
+            raise QuantityError(f"'{word}' takes {'no value' if kind is Part.NOTHING else f'a {kind.value}'}", how)
+        parts = {"task": word, **(data[word] if isinstance(data[word], Mapping) else {main: data[word]})}
+    elif not words and isinstance(data.get("do"), Mapping) and "task" in data["do"]:
+        parts = dict(data["do"])
+    else:
+        return data
+    named = {_PARTS.get(key, key): value for key, value in parts.items() if value is not None}
+    return {**named, **said} if named.keys().isdisjoint(said) else data
 
 
 if not TYPE_CHECKING:

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from skills.inputs.errors import InputError
 from skills.inputs.plugins import class_entries
-from skills.inputs.schema import Strict, validate
+from skills.inputs.schema import Strict, matching, validate
 from skills.inputs.yaml_source import read_yaml, yaml_of
 from skills.robot import quantities
 
@@ -67,6 +67,9 @@ FACTS_FILE: Final = "object.yaml"
 _AGAIN: Final = "make it by `errand object import`"
 OBJECT_NAME: Final = r"^[A-Za-z][A-Za-z0-9_]{0,39}$"
 """Pattern of the names of imported objects."""
+_ObjectName = Annotated[
+    str, matching(OBJECT_NAME, "should be a name", "write letters, digits and _, a letter first, at most 40")
+]
 Inertia = Annotated[float, quantities.Quantity(ge=-1e6, le=1e6)]
 Photographs = Annotated[int, quantities.Quantity(ge=0, le=1000)]
 Parts = Annotated[int, quantities.Quantity(ge=1, le=10_000_000)]
@@ -82,8 +85,8 @@ class ImportedObject(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True, allow_inf_nan=False)
 
-    name: Annotated[str, Field(pattern=OBJECT_NAME)]
-    class_name: Annotated[str, Field(alias="class", pattern=OBJECT_NAME)]
+    name: _ObjectName
+    class_name: Annotated[_ObjectName, Field(alias="class")]
     mass_kg: quantities.Mass
     size_m: tuple[quantities.Length, quantities.Length, quantities.Length]
     com_m: tuple[quantities.Coordinate, quantities.Coordinate, quantities.Coordinate]

@@ -11,21 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import SceneGraphInspector
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import BodyIndex
 
-from plant.sensors.ray_shapes import ShapeKind, shape_row
+from plant.sensors.ray_shapes import BAND_M, outlines_W
 from plant.worlds.world import Point, WorldError
 from skills.robot import FloatArray
 
-BAND_M = (0.05, 1.8)
-"""Shapes between these heights are obstacles for a person."""
 SHOULDERS_M = 0.30
 """Clearance of a person's centre from obstacles on the path."""
 LEAST_M = 0.20
 """Clearance of a person's centre from obstacles at a waypoint."""
 _CELL_M = 0.05
 _NEAR_WAYPOINT_M = 0.5
-_ROUND_SIDES = 16
 _STEPS = ((0, 1, 1.0), (1, 0, 1.0), (1, 1, math.sqrt(2.0)), (1, -1, math.sqrt(2.0)))
 
 
@@ -48,7 +44,7 @@ class Ground:
         band_m: tuple[float, float] = BAND_M,
     ) -> Ground:
         """Builds the ground of a finalized plant; the shapes fixed to the world in a band of heights are obstacles."""
-        return Ground([*_outlines_W(plant, inspector, band_m)], points_W)
+        return Ground([outline for _, outline in outlines_W(plant, inspector, band_m)], points_W)
 
     def with_obstacles(self, outlines_W: Iterable[FloatArray]) -> Ground:
         """Returns the same ground with more obstacles."""
@@ -183,31 +179,6 @@ class Ground:
         """Row and column of a point, or of each point of an array."""
         cells: NDArray[np.int64] = np.floor((np.asarray(points_W) - self._low) / _CELL_M).astype(np.int64)
         return cells[..., ::-1]
-
-
-def _outlines_W(
-    plant: MultibodyPlant, inspector: SceneGraphInspector, band_m: tuple[float, float]
-) -> Iterable[FloatArray]:
-    """Outlines (K, 2) from above of the shapes that are fixed to the world and reach into the band."""
-    context = plant.CreateDefaultContext()
-    for body in (plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies())):
-        if not plant.IsAnchored(body):
-            continue
-        X_WB = plant.EvalBodyPoseInWorld(context, body)
-        for geometry in plant.GetCollisionGeometriesForBody(body):
-            kind, half_m, X_BG = shape_row(inspector, geometry)
-            corners_W = (X_WB @ X_BG).multiply((_unit_corners(kind) * half_m).T).T
-            if corners_W[:, 2].max() > band_m[0] and corners_W[:, 2].min() < band_m[1]:
-                yield cv2.convexHull(corners_W[:, :2].astype(np.float32)).reshape(-1, 2).astype(np.float64)
-
-
-def _unit_corners(kind: ShapeKind) -> FloatArray:
-    """Corner points (N, 3) around a shape with half extents of 1."""
-    turn = np.arange(_ROUND_SIDES) * math.tau / _ROUND_SIDES
-    ring = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], dtype=np.float64)
-    if kind is not ShapeKind.BOX:
-        ring = np.column_stack([np.cos(turn), np.sin(turn)])
-    return np.vstack([np.column_stack([ring, np.full(len(ring), z)]) for z in (-1.0, 1.0)])
 
 
 def _text(point: Point) -> str:

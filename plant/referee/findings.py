@@ -1,30 +1,23 @@
-"""Findings of the referee, helpers of all judges, and the judges for following, guiding and greeting."""
+"""Findings of the referee, helpers of all judges, and the judges of company and pictures."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 
 from executive.words.goal import GoalCondition, GoalKind, Region, When
 from plant.referee.object_history import HIDES_M, ObjectHistory, TakenPicture, TimedPath, Truth
-from skills.inputs.errors import count_text, definite
+from skills.inputs.errors import definite
 from skills.relations import Scene, Standing, choose
 from skills.robot import FloatArray
 
 NAMED_REGIONS = 3
-NEAR_M: Final[Mapping[GoalKind, float]] = MappingProxyType(
-    {GoalKind.WENT: 2.0, GoalKind.MET: 2.0, GoalKind.FOLLOWED: 3.0, GoalKind.GUIDED: 3.0, GoalKind.GREETED: 2.5}
-)
-"""Greatest distance of the robot's body from the person for each kind."""
-LOST_M: Final = 5.0
-LONGEST_LOSS_S: Final = 10.0
-"""A robot that was farther than this from the person, for longer than this, has lost the person."""
+NEAR_M: Final = 2.0
+"""Greatest distance of the robot's body from a person to whom it has gone."""
 SLACK_M: Final = 0.05
 """Distance by which the relations of an object may be missed."""
-_SAMPLE_S: Final = 0.1
 
 
 @dataclass(frozen=True)
@@ -33,11 +26,6 @@ class Finding:
 
     holds: bool
     sentence: str
-
-
-def step_end_s(condition: GoalCondition, truth: Truth) -> float:
-    """Time at which the step that belongs to a condition ended; the present time while it runs."""
-    return truth.now_s if condition.ended_s is None else min(condition.ended_s, truth.now_s)
 
 
 def is_past(condition: GoalCondition) -> bool:
@@ -89,52 +77,48 @@ def where(regions: Sequence[Region]) -> str:
     return " or ".join(names) if len(names) <= NAMED_REGIONS else f"any of {len(names)} places"
 
 
-def judge_company(condition: GoalCondition, truth: Truth) -> Finding:
-    """Judges whether a robot was near a person at the person's goal and, when following, never lost them."""
-    people = {name: path for name, path in truth.persons.items() if condition.person in (None, name)}
+def judge_company(
+    condition: GoalCondition,
+    truth: Truth,
+    near_m: float = NEAR_M,
+    on_the_way: Callable[[TimedPath, TimedPath], Finding] = lambda robot, person: Finding(True, ""),
+) -> Finding:
+    """Judges whether a robot was near a person at the person's goal.
+
+    `on_the_way` judges the paths of a robot and a person before that; the finding quotes its words.
+    """
+    people = truth.persons_of(condition)
     if not people:
         return Finding(False, f"there is no person {condition.person or ''}".rstrip() + " to go to.")
     findings = [
-        _judge_pair(condition, robot, name, truth)
-        for robot in truth.robots
-        if condition.robot in (None, robot)
-        for name in sorted(people, key=lambda name: _apart_m(condition, truth.robots[robot], people[name], truth))
+        _judge_pair(condition, robot, name, truth, near_m, on_the_way(path, people[name]))
+        for robot, path in truth.robots_of(condition).items()
+        for name in sorted(people, key=lambda name: _apart_m(condition, path, people[name], truth))
     ]
     missing = Finding(False, f"there is no robot {condition.robot}.")
     return next((each for each in findings if each.holds), findings[0] if findings else missing)
 
 
-def lost_s(robot: TimedPath, person: TimedPath, from_s: float, until_s: float) -> float:
-    """Longest time (s) for which a robot was farther than `LOST_M` from a person."""
-    times = np.arange(max(from_s, person.points[0, 3]), until_s, _SAMPLE_S)
-    far = np.hypot(*(robot.positions_at(times) - person.positions_at(times))[:, :2].T) > LOST_M
-    longest = run = 0
-    for each in far:
-        run = run + 1 if each else 0
-        longest = max(longest, run)
-    return _SAMPLE_S * longest
-
-
-def _judge_pair(condition: GoalCondition, robot: str, person: str, truth: Truth) -> Finding:
+def _judge_pair(
+    condition: GoalCondition, robot: str, person: str, truth: Truth, near_m: float, way: Finding
+) -> Finding:
     """Judges one robot with one person."""
-    path, other, until_s = truth.robots[robot], truth.persons[person], step_end_s(condition, truth)
+    path, other = truth.robots[robot], truth.persons[person]
     apart_m, verb = _apart_m(condition, path, other, truth), "was" if is_past(condition) else "is"
-    sentence = f"{robot} {verb} {apart_m:.1f} m from {person}"
-    if condition.kind is GoalKind.FOLLOWED and (gone_s := lost_s(path, other, condition.from_s, until_s)):
-        sentence += f", and was over {LOST_M:g} m away for {gone_s:.0f} s"
-        if gone_s > LONGEST_LOSS_S:
-            return Finding(False, f"{sentence}.")
+    sentence = f"{robot} {verb} {apart_m:.1f} m from {person}{way.sentence}"
+    if not way.holds:
+        return Finding(False, f"{sentence}.")
     goal = condition.goal if condition.kind is not GoalKind.WENT else ()
-    if goal and region_at(goal, other.position_at(until_s)) is None:
-        x, y, _ = other.position_at(until_s)
-        return Finding(False, f"{sentence}, who stood at ({x:.2f}, {y:.2f}), not in {where(goal)}.")
-    there = f" in {region_at(goal, other.position_at(until_s))}" if goal else ""
-    return Finding(apart_m <= NEAR_M[condition.kind], f"{sentence}{there}.")
+    at_W = other.position_at(truth.ended_s(condition))
+    if goal and region_at(goal, at_W) is None:
+        return Finding(False, f"{sentence}, who stood at ({at_W[0]:.2f}, {at_W[1]:.2f}), not in {where(goal)}.")
+    there = f" in {region_at(goal, at_W)}" if goal else ""
+    return Finding(apart_m <= near_m, f"{sentence}{there}.")
 
 
 def _apart_m(condition: GoalCondition, robot: TimedPath, person: TimedPath, truth: Truth) -> float:
     """Distance between a robot and a person at the time to which a condition refers, in metres."""
-    until_s = step_end_s(condition, truth)
+    until_s = truth.ended_s(condition)
     at_W = person.position_at(until_s)
     if condition.when is When.SOME_TIME:
         return min(distance_m(p_W, at_W) for p_W in robot.positions_between(condition.from_s, until_s))
@@ -143,7 +127,7 @@ def _apart_m(condition: GoalCondition, robot: TimedPath, person: TimedPath, trut
 
 def judge_pictured(condition: GoalCondition, truth: Truth) -> Finding:
     """Judges whether enough pictures of the step show the wanted object or point, or were taken in the source."""
-    from_s, until_s = condition.from_s, step_end_s(condition, truth)
+    from_s, until_s = condition.from_s, truth.ended_s(condition)
     own = [each for each in truth.pictures if condition.robot in (None, each.robot)]
     taken = [each for each in own if from_s <= each.time_s <= until_s]
     right = sum(_shows(each, condition, truth) for each in taken)
@@ -162,37 +146,3 @@ def _shows(taken: TakenPicture, condition: GoalCondition, truth: Truth) -> bool:
     hides_m = math.inf if condition.source else HIDES_M
     middles = [(*np.mean(each.polygon_W, axis=0), 0.5 * (each.z_min_m + each.z_max_m)) for each in condition.goal]
     return all(taken.shows(np.array(middle), hides_m) for middle in middles)
-
-
-def judge_greeted(condition: GoalCondition, truth: Truth) -> Finding:
-    """Judges whether the robot spoke near each person who stayed in the region, once per person.
-
-    A person who came or left during the step may be greeted or not.
-    """
-    from scipy.optimize import linear_sum_assignment  # takes half a second, and few missions have greetings
-
-    from_s, until_s = condition.from_s, step_end_s(condition, truth)
-    robots = [path for name, path in truth.robots.items() if condition.robot in (None, name)]
-    among = {name: path for name, path in truth.persons.items() if condition.person in (None, name)}
-    goal = condition.goal
-    inside = {
-        name: [not goal or region_at(goal, p_W) is not None for p_W in path.positions_between(from_s, until_s)]
-        for name, path in among.items()
-    }
-    stayed = [name for name, ins in inside.items() if all(ins)]
-    present = [name for name in among if any(inside[name])]
-    times_s = condition.spoken_s
-    near = np.array([[_spoke_near(condition, robots, among[name], t_s) for t_s in times_s] for name in stayed])
-    greeted = near.size and int(near[linear_sum_assignment(near, maximize=True)].sum())
-    said, there = len(times_s), f"{' and '.join(stayed) or 'nobody'} stood in {where(condition.goal)}"
-    was = f"{'was' if len(stayed) == 1 else 'were'}{' not' if stayed and not greeted else ''} greeted"
-    some = f"{greeted} of {len(stayed)} " if 0 < greeted < len(stayed) else ""
-    heard = f" and {some}{was}" if stayed else ""
-    extra = f"; the robot spoke {count_text(said, 'time')}" if said != greeted else ""
-    return Finding(greeted == len(stayed) and said <= max(1, len(present)), f"{there}{heard}{extra}.")
-
-
-def _spoke_near(condition: GoalCondition, robots: list[TimedPath], person: TimedPath, time_s: float) -> bool:
-    """Returns whether a robot was near a person at a time."""
-    p_W: FloatArray = person.position_at(time_s)
-    return any(distance_m(robot.position_at(time_s), p_W) <= NEAR_M[condition.kind] for robot in robots)

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
 from executive.words.goal import GoalCondition, GoalKind, RefereeReport, Region, When
+from executive.words.task import task_named
 from plant.referee.entities import Collision
 from plant.referee.findings import (
     Finding,
@@ -10,10 +11,8 @@ from plant.referee.findings import (
     has_relations,
     is_past,
     judge_company,
-    judge_greeted,
     judge_pictured,
     region_at,
-    step_end_s,
     the,
     where,
 )
@@ -65,7 +64,7 @@ def _is_about(condition: GoalCondition, objects: Sequence[ObjectHistory], truth:
 
 def _taken_again(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:
     """Returns whether a later step of the same mission lifted an object again."""
-    ended_s = step_end_s(condition, truth)
+    ended_s = truth.ended_s(condition)
     return any(
         lift.time_s > ended_s and from_s <= lift.time_s <= until_s + SETTLE_S
         for lift in history.lifts
@@ -75,7 +74,7 @@ def _taken_again(history: ObjectHistory, condition: GoalCondition, truth: Truth)
 
 def _judge_grasped(condition: GoalCondition, truth: Truth) -> Finding:
     """Judges whether the objects were lifted from the source, and held at the required times."""
-    until_s = step_end_s(condition, truth)
+    until_s = truth.ended_s(condition)
     from_s = condition.from_s if condition.when is When.SOME_TIME else condition.since_s
     candidates = ((one, _lift(one, condition, from_s, until_s)) for one in _of_class(condition, truth))
     lifted = {
@@ -114,10 +113,10 @@ def _is_held(history: ObjectHistory, condition: GoalCondition, until_s: float) -
 
 def _judge_handed_over(condition: GoalCondition, truth: Truth) -> Finding:
     """Judges whether the objects rest on the person's tray, released by the gripper."""
-    people = {name: path for name, path in truth.persons.items() if condition.person in (None, name)}
+    people = truth.persons_of(condition)
     if not people:
         return Finding(False, f"There is no person {condition.person or ''} to hand anything to.".replace("  ", " "))
-    until_s = step_end_s(condition, truth)
+    until_s = truth.ended_s(condition)
     objects = [one for one in _of_class(condition, truth) if _lift(one, condition, condition.since_s, until_s)]
     given = [one for one in objects if _was_given(one, people, condition, truth)]
     if is_past(condition):
@@ -136,7 +135,7 @@ def _judge_handed_over(condition: GoalCondition, truth: Truth) -> Finding:
 
 def _was_given(history: ObjectHistory, people: Collection[str], condition: GoalCondition, truth: Truth) -> bool:
     """Returns whether an object came to rest on a person's tray, and was there at the required times."""
-    until_s = step_end_s(condition, truth)
+    until_s = truth.ended_s(condition)
     for person in people:
         for first_s, last_s in truth.given.get((history.name, person), ()):
             in_time = condition.from_s <= first_s <= until_s + SETTLE_S
@@ -164,7 +163,7 @@ def _why_not_handed(
 
 def _judge_placed(condition: GoalCondition, truth: Truth) -> Finding:
     """Judges whether the objects rest in the goal, released by the gripper."""
-    until_s = step_end_s(condition, truth)
+    until_s = truth.ended_s(condition)
     objects = [one for one in _of_class(condition, truth) if _lift(one, condition, condition.since_s, until_s)]
     put = {one: p_W for one in objects if (p_W := _put_in(one, condition, truth)) is not None}
     done = {one: p_W for one, p_W in put.items() if has_relations(one, p_W, until_s, condition, truth)}
@@ -202,7 +201,7 @@ def _where_it_is(history: ObjectHistory, condition: GoalCondition, truth: Truth)
 
 def _put_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> FloatArray | None:
     """Position in the goal where a robot put an object; None when the object was not there at the required times."""
-    until_s = step_end_s(condition, truth)
+    until_s = truth.ended_s(condition)
     if condition.when is When.SOME_TIME:
         rests = history.own_rests_W(condition.from_s, until_s + SETTLE_S)
         return next((p_W for p_W in rests if region_at(condition.goal, p_W) is not None), None)
@@ -219,7 +218,7 @@ def _put_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> F
 
 def _judge_went(condition: GoalCondition, truth: Truth) -> Finding:
     """Judges whether the robot's body was in the goal at the required times."""
-    robots = [name for name in truth.robots if condition.robot in (None, name)]
+    robots = truth.robots_of(condition)
     if not robots:
         return Finding(False, f"There is no robot {condition.robot}.")
     if condition.person is not None:
@@ -230,7 +229,7 @@ def _judge_went(condition: GoalCondition, truth: Truth) -> Finding:
 
 def _points(condition: GoalCondition, path: TimedPath, truth: Truth) -> Sequence[FloatArray]:
     """Positions on a path at the required times, sorted by time."""
-    until_s = step_end_s(condition, truth)
+    until_s = truth.ended_s(condition)
     if condition.when in (When.SOME_TIME, When.ALWAYS):
         return list(path.positions_between(condition.from_s, until_s))
     if condition.when is When.END_OF_MISSION:
@@ -254,8 +253,7 @@ def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
     then_s, aside = condition.answered_s, []
     if condition.classes == (PERSON,):
         when_s = truth.now_s if then_s is None else then_s
-        persons = truth.persons.items()
-        people = ((name, path.position_at(when_s)) for name, path in persons if condition.person in (None, name))
+        people = ((name, path.position_at(when_s)) for name, path in truth.persons_of(condition).items())
         verb = "is" if then_s is None else "was"
         there = [f"{name} {verb} in {on}" for name, p_W in people if (on := region_at(condition.source, p_W))]
         who = condition.person or "nobody"
@@ -291,7 +289,7 @@ def _judge_door(condition: GoalCondition, truth: Truth) -> Finding:
 
 def _judge_opened(condition: GoalCondition, truth: Truth) -> Finding:
     """Judges whether a door was open at the end of the step."""
-    was = _door_state(condition, truth, step_end_s(condition, truth))
+    was = _door_state(condition, truth, truth.ended_s(condition))
     return Finding(was != "closed", f"{the(condition.source[0].name)} was {was}.")
 
 
@@ -324,7 +322,7 @@ def _judge_cleared(condition: GoalCondition, truth: Truth) -> Finding:
 
 def _was_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:
     """Returns whether an object rested in the source when the step began, or came to rest there during it."""
-    from_s, until_s = condition.from_s, step_end_s(condition, truth)
+    from_s, until_s = condition.from_s, truth.ended_s(condition)
     came = zip(history.rested_s, history.rests_W, strict=True)
     began_W = history.place_at(from_s)
     places = [*(p_W for when_s, p_W in came if from_s < when_s <= until_s), *(() if began_W is None else (began_W,))]
@@ -333,7 +331,7 @@ def _was_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> b
 
 def _is_left(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:
     """Returns whether an object was in the source at the end of the step, or is there now and was not put back."""
-    until_s = step_end_s(condition, truth)
+    until_s = truth.ended_s(condition)
     put = history.rest_at(until_s)
     then_W = put[1] if put is not None else history.place_at(until_s)
     now = region_at(condition.source, history.last.p_WO) is not None
@@ -345,6 +343,18 @@ def _is_left(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> 
     return condition.when is When.END_OF_MISSION and now and not back
 
 
+def _judge_own(condition: GoalCondition, truth: Truth) -> Finding:
+    """Judges a condition by the page of its task; one that it cannot judge does not hold."""
+    task = task_named(condition.task)
+    try:
+        holds, sentence = task.judge(condition, truth)
+        if holds not in (True, False) or not (isinstance(sentence, str) and sentence):
+            raise TypeError("it returns no pair of True or False and a sentence")
+    except Exception as defect:
+        return Finding(False, f"{task.named} cannot judge it ({type(defect).__name__}: {defect}).")
+    return Finding(bool(holds), sentence)
+
+
 _JUDGES: Mapping[GoalKind, Callable[[GoalCondition, Truth], Finding]] = {
     GoalKind.GRASPED: _judge_grasped,
     GoalKind.HANDED_OVER: _judge_handed_over,
@@ -354,11 +364,9 @@ _JUDGES: Mapping[GoalKind, Callable[[GoalCondition, Truth], Finding]] = {
     GoalKind.DOOR_OPEN: _judge_door,
     GoalKind.DOOR_OPENED: _judge_opened,
     GoalKind.CLEARED: _judge_cleared,
-    GoalKind.FOLLOWED: judge_company,
-    GoalKind.GUIDED: judge_company,
     GoalKind.MET: judge_company,
-    GoalKind.GREETED: judge_greeted,
     GoalKind.PICTURED: judge_pictured,
+    GoalKind.OWN: _judge_own,
 }
 
 

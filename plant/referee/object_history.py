@@ -9,8 +9,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
 
+from executive.words.goal import GoalCondition
 from plant.saved_state import Stateful
 from skills.inputs.errors import definite
 from skills.robot import FloatArray, Intrinsics
@@ -334,6 +335,18 @@ class TimedPath:
 
 
 @dataclass(frozen=True)
+class TimedPoses:
+    """Poses X_WH of a hand: its positions (m, world), and its roll, pitch and yaw (rad) at the same times."""
+
+    positions: TimedPath
+    turns: TimedPath
+
+    def pose_at(self, time_s: float) -> RigidTransform:
+        """Pose at a time."""
+        return RigidTransform(RollPitchYaw(self.turns.position_at(time_s)), self.positions.position_at(time_s))
+
+
+@dataclass(frozen=True)
 class TakenPicture:
     """Picture that a robot took: true pose, lens and depth (m; 0: unknown) of the camera, and the objects `seen` in it.
 
@@ -363,7 +376,7 @@ class Truth:
 
     `given` are the intervals (s) in which an object rested on a person's tray, by object and person. `doors` are the
     times (s) and states of each sliding door by its position (x, y): 0 open, 1 closed, between while it moves. Any
-    other door is open.
+    other door is open. `hands` are the poses of the robots' hands by robot.
     """
 
     now_s: float
@@ -373,6 +386,19 @@ class Truth:
     given: Mapping[tuple[str, str], Sequence[tuple[float, float]]]
     doors: Mapping[Point, Sequence[tuple[float, float]]] = field(default_factory=dict)
     pictures: Sequence[TakenPicture] = ()
+    hands: Mapping[str, TimedPoses] = field(default_factory=dict)
+
+    def ended_s(self, condition: GoalCondition) -> float:
+        """Time at which the step that belongs to a condition ended; the present time while it runs."""
+        return self.now_s if condition.ended_s is None else min(condition.ended_s, self.now_s)
+
+    def robots_of(self, condition: GoalCondition) -> Mapping[str, TimedPath]:
+        """Paths of the robots that a condition is about, by name."""
+        return {name: path for name, path in self.robots.items() if condition.robot in (None, name)}
+
+    def persons_of(self, condition: GoalCondition) -> Mapping[str, TimedPath]:
+        """Paths of the people whom a condition is about, by name."""
+        return {name: path for name, path in self.persons.items() if condition.person in (None, name)}
 
 
 def extend_path(path: list[FloatArray], p_W: FloatArray, time_s: float, most: float = math.inf) -> None:

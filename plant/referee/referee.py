@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import deque
+from collections import ChainMap, deque
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.geometry import GeometryId
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex
@@ -25,6 +26,7 @@ from plant.referee.object_history import (
     ObjectSample,
     TakenPicture,
     TimedPath,
+    TimedPoses,
     Truth,
     extend_path,
     extend_stays,
@@ -40,6 +42,8 @@ PATH_VALUES = 4
 MOST_COLUMNS = 64
 """Columns of the depth of a picture that is kept."""
 BEFORE_SAMPLES = 3
+HAND, HAND_TURN, HAND_STEP = "hand of {}", "turn of the hand of {}", 0.02
+"""Names of a hand's paths (positions; roll, pitch and yaw), and its least motion (m, rad) that they record."""
 TOUCH_M_S, TOUCH_N, TIPS_M = 0.05, 20.0, 0.04
 """Most speed and force of an expected touch, and the length of the fingertips, which alone may touch."""
 MOST_POINTS = 20_000
@@ -78,6 +82,8 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         classes, sides_m = self._entities.classes, self._entities.sides_m
         self._histories = {name: ObjectHistory(name, classes[name], sides_m[name]) for name in self._entities.objects}
         self._paths: dict[str, list[FloatArray]] = {name: [] for name in robots}
+        hand_paths = [path.format(name) for name in self._entities.hands for path in (HAND, HAND_TURN)]
+        self._hand_paths: dict[str, list[FloatArray]] = {name: [] for name in hand_paths}
         self._given: dict[tuple[str, str], list[tuple[float, float]]] = {}
         self.contact_points = 0
         self._bases: dict[str, FloatArray] = {}
@@ -143,6 +149,8 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
             extend_path(self._paths[name], p_WB, time_s)
         for name, p_W in self._persons.items():
             extend_path(self._person_paths[name], p_W, time_s, MOST_POINTS)
+        for name, body in self._entities.hands.items():
+            self._extend_hand(name, self._plant.EvalBodyPoseInWorld(plant_context, body), time_s)
         self._now_s = time_s
         neighbours = self._neighbours(pairs)
         for name, body in self._entities.objects.items():
@@ -154,6 +162,17 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         for history in self._histories.values():
             if history.on_tray_of is not None:
                 extend_stays(self._given.setdefault((history.name, history.on_tray_of), []), time_s)
+
+    def _hand(self, robot: str) -> tuple[list[FloatArray], list[FloatArray]]:
+        return self._hand_paths[HAND.format(robot)], self._hand_paths[HAND_TURN.format(robot)]
+
+    def _extend_hand(self, robot: str, X_WH: RigidTransform, time_s: float) -> None:
+        """Appends the pose of a hand to its two paths when the hand has moved or turned."""
+        paths, pose = self._hand(robot), (X_WH.translation(), RollPitchYaw(X_WH.rotation()).vector())
+        last = [path[-1][:3] for path in paths if path]
+        if not last or float(np.max(np.abs(np.subtract(pose, last)))) >= HAND_STEP:
+            for path, values in zip(paths, pose, strict=True):
+                path.append(np.append(values, time_s))
 
     def expect_touch(self, robot: str, until_s: float) -> None:
         """Records that a robot says that its fingertips may touch a surface until a time."""
@@ -206,6 +225,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
             given=dict(self._given),
             doors=self._doors(),
             pictures=self._pictures,
+            hands={name: TimedPoses(*map(TimedPath, map(_timed, self._hand(name)))) for name in self._entities.hands},
         )
         return judge(conditions, truth, collisions=self._counter.collisions)
 
@@ -225,6 +245,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         self._counter.collisions, self._given, self._pictures = [], {}, ()
         self._paths = {name: [] for name in self._paths}
         self._person_paths = {name: [] for name in self._person_paths}
+        self._hand_paths = {name: [] for name in self._hand_paths}
         for history in self._histories.values():
             history.forget_past()
 
@@ -241,18 +262,18 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the robots and of the people."""
-        return (*sorted(self._paths), *sorted(self._person_paths))
+        """Names of the paths: of robots, people and hands."""
+        return (*sorted(self._paths), *sorted(self._person_paths), *sorted(self._hand_paths))
 
     def points(self, name: str) -> Sequence[FloatArray]:
-        """Points of a robot's or person's path with their times (s); do not change them. Raises KeyError.
+        """Points of a path with their times (s); do not change them. Raises KeyError.
 
-        A robot's path only grows; a long path of a person loses some of its older points.
+        The paths of a robot and its hand only grow; a long path of a person loses some of its older points.
         """
         return self._path(name)
 
     def _path(self, name: str) -> list[FloatArray]:
-        return self._paths[name] if name in self._paths else self._person_paths[name]
+        return ChainMap(self._paths, self._person_paths, self._hand_paths)[name]
 
     def _speeds_before(self) -> dict[str, float]:
         """Lowest recent speed of each robot, so that a push that has just begun does not count as its own motion."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from typing import TypeVar
 
 import numpy as np
@@ -22,7 +22,7 @@ from plant.robots.servos import (
     Velocity,
 )
 from plant.saved_state import State, Stateful
-from skills.command_table import CommandTable, LeaseManager
+from skills.command_table import CommandTable, LeaseManager, refusal_of
 from skills.robot import (
     ArmTrajectory,
     Battery,
@@ -34,7 +34,6 @@ from skills.robot import (
     DoorHandle,
     FloatArray,
     Gripper,
-    GripperKind,
     Image,
     Imu,
     Joints,
@@ -115,23 +114,14 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
     def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
         """Moves at a body-frame velocity (m/s, m/s, rad/s) until the clock reads until_s."""
         velocity = Velocity(vx, vy, wz)
-        if not all(math.isfinite(value) for value in (vx, vy, wz)):
-            return self._commands.refuse(f"drive: velocity ({vx}, {vy}, {wz}) is not finite")
-        reason = self._drive_refusal(velocity)
-        return self._commands.refuse(reason) if reason else self._begin(Part.VELOCITY, velocity, until_s, lease)
+        return self._begin(Part.VELOCITY, velocity, until_s, lease, self._drive_refusal(velocity), (vx, vy, wz))
 
     def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
         """Turns the head to a pan (positive to the left) and a tilt (positive looks down)."""
         head = self._capabilities.head
         if head is None:
             return self._commands.refuse("point_head: the robot has no head", CommandCause.UNSUPPORTED)
-        (left, right), (up, down) = head.pan_range_rad, head.tilt_range_rad
-        if not (left <= pan_rad <= right and up <= tilt_rad <= down):
-            return self._commands.refuse(
-                f"point_head: pan {pan_rad:.2f} rad must lie in [{left}, {right}] "
-                f"and tilt {tilt_rad:.2f} rad in [{up}, {down}]"
-            )
-        return self._begin(Part.HEAD, (pan_rad, tilt_rad), until_s, lease)
+        return self._begin(Part.HEAD, (pan_rad, tilt_rad), until_s, lease, head.refusal(pan_rad, tilt_rad))
 
     def dock(self, station: int, *, until_s: float, lease: Lease) -> CommandId:
         """Refuses: a simulated robot charges where it stands."""
@@ -147,25 +137,19 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
         """Follows a joint trajectory; done when the arm rests at its end."""
-        reason = self._arm.refusal(trajectory)
-        return self._commands.refuse(reason) if reason else self._begin(Part.ARM, trajectory, until_s, lease)
+        return self._begin(Part.ARM, trajectory, until_s, lease, self._arm.refusal(trajectory))
 
     def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
         """Moves the gripper to an opening with at most force_n at its tip; the force stays after the command's end."""
         gripper = self._capabilities.gripper
         if gripper is None:
             return self._commands.refuse("set_gripper: the robot has no gripper", CommandCause.UNSUPPORTED)
-        if not (0.0 <= opening <= gripper.widest and 0.0 < force_n <= gripper.max_force_n):
-            unit = "rad" if gripper.kind is GripperKind.HINGED else "m"
-            return self._commands.refuse(
-                f"set_gripper: opening {opening:.3f} {unit} must lie in [0, {gripper.widest}] "
-                f"and force {force_n:.0f} N in (0, {gripper.max_force_n}]"
-            )
-        command = self._begin(Part.GRIPPER, GripperGoal(opening, force_n), until_s, lease)
+        goal = GripperGoal(opening, force_n)
+        command = self._begin(Part.GRIPPER, goal, until_s, lease, gripper.refusal(opening, force_n))
         if self._runs(command):
             if opening > self._sensors.gripper.opening:
                 self._sensors.tell_held(False)
-            self._gripper.begin(GripperGoal(opening, force_n))
+            self._gripper.begin(goal)
         return command
 
     def carry(self, holding: bool, *, lease: Lease) -> None:
@@ -293,14 +277,19 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
             reason = "" if closing is Closing.ARRIVED else "stopped by an object in the gripper"
             self._commands.finish(Part.GRIPPER, CommandState.DONE, reason)
 
-    def _begin(self, part: Part, goal: object, until_s: float, lease: Lease) -> CommandId:
-        refusal = self._leases.refusal(lease)
-        if refusal:
-            return self._commands.refuse(f"{part.value}: {refusal}", CommandCause.NO_LEASE)
-        if until_s <= self._now_s:
-            return self._commands.refuse(
-                f"{part.value}: expires at {until_s:.2f} s, and it is {self._now_s:.2f} s already", CommandCause.LATE
-            )
+    def _begin(
+        self,
+        part: Part,
+        goal: object,
+        until_s: float,
+        lease: Lease,
+        invalid: str | None = None,
+        values: Iterable[float] = (),
+    ) -> CommandId:
+        """Begins a command, unless its values are `invalid` or a robot refuses it (`refusal_of`)."""
+        refused = refusal_of(part.value, self._leases.refusal(lease), values, until_s=until_s, now_s=self._now_s)
+        if refused or invalid:
+            return self._commands.refuse(*(refused or (invalid or "",)))
         return self._commands.begin(part, goal, self._now_s, until_s)
 
     def _runs(self, command: CommandId) -> bool:

@@ -7,9 +7,11 @@ bounding boxes replace meshes and convex hulls; a very wide box below the surfac
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Collection, Mapping, Sequence
+import math
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import (
@@ -35,6 +37,9 @@ from skills.robot import FloatArray
 Row = tuple["ShapeKind", FloatArray, RigidTransform]
 
 HALF_SPACE_HALF_WIDTH_M = 500.0
+BAND_M = (0.05, 1.8)
+"""Shapes between these heights are obstacles for a person."""
+_ROUND_SIDES = 16
 
 
 class ShapeKind(enum.IntEnum):
@@ -128,3 +133,32 @@ _MAKERS: Mapping[type[Shape], Callable[..., tuple[ShapeKind, Sequence[float]]]] 
     Sphere: lambda shape: (ShapeKind.ELLIPSOID, (shape.radius(),) * 3),
     Ellipsoid: lambda shape: (ShapeKind.ELLIPSOID, (shape.a(), shape.b(), shape.c())),
 }
+
+
+def outlines_W(
+    plant: MultibodyPlant, inspector: SceneGraphInspector, band_m: tuple[float, float] = BAND_M
+) -> Iterator[tuple[GeometryId, FloatArray]]:
+    """Yields the shapes of a finalized plant that are fixed to the world and reach into the band, with their outlines.
+
+    An outline (K, 2) is that from above.
+    """
+    context = plant.CreateDefaultContext()
+    for body in (plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies())):
+        if not plant.IsAnchored(body):
+            continue
+        X_WB = plant.EvalBodyPoseInWorld(context, body)
+        for geometry in plant.GetCollisionGeometriesForBody(body):
+            kind, half_m, X_BG = shape_row(inspector, geometry)
+            corners_W = (X_WB @ X_BG).multiply((_unit_corners(kind) * half_m).T).T
+            if corners_W[:, 2].max() > band_m[0] and corners_W[:, 2].min() < band_m[1]:
+                outline = cv2.convexHull(corners_W[:, :2].astype(np.float32))
+                yield geometry, outline.reshape(-1, 2).astype(np.float64)
+
+
+def _unit_corners(kind: ShapeKind) -> FloatArray:
+    """Corner points (N, 3) around a shape with half extents of 1."""
+    turn = np.arange(_ROUND_SIDES) * math.tau / _ROUND_SIDES
+    ring = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], dtype=np.float64)
+    if kind is not ShapeKind.BOX:
+        ring = np.column_stack([np.cos(turn), np.sin(turn)])
+    return np.vstack([np.column_stack([ring, np.full(len(ring), z)]) for z in (-1.0, 1.0)])

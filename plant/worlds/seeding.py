@@ -7,6 +7,7 @@ import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 import shapely
@@ -110,6 +111,8 @@ _LAPSE_EVERY_M = (4.0, 10.0)
 _LAPSE_BACK_M = (1.0, 3.0)
 _LAPSE_STOP_S = (2.0, 6.0)
 ATTEMPTS = 500
+BODY_RADIUS_M: Final = 0.2
+"""Radius about a standing person's centre in which nothing else is."""
 ROUND_SIDES = 16
 _OBJECT_STREAM = 1
 _PEOPLE_STREAM = 2
@@ -227,12 +230,15 @@ def candidates(world: World, surface: SurfaceTop, rng: np.random.Generator) -> I
 def _place_person(world: World, rule: PersonRule, form: ModelForm, seed: int, index: int) -> Placement:
     stream = (seed, _WALK_STREAM, index)
     route = None if rule.route is None else point_route(rule.route, world.standing, stream)
-    if rule.ranges is not None:
+    if rule.pose is not None:
+        x, y, yaw = rule.pose.x, rule.pose.y, rule.pose.yaw
+    elif rule.ranges is not None:
         x, y, yaw = _before_start(world, rule.ranges, np.random.default_rng([seed, _PEOPLE_STREAM, index]))
-        route = None if route is None else route.from_pose((x, y), yaw)
     else:
         assert route is not None
         (x, y), yaw = route.stops[0].at_W, route.first_yaw_rad
+    if route is not None and (rule.pose or rule.ranges):
+        route = route.from_pose((x, y), yaw)
     X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([x, y, form.rest_height_m], dtype=np.float64))
     receiving = Receiving(rule.pull_n, rule.reaction_s) if rule.receives else None
     return Placement(rule.name, rule.model, form, X_WO, route=route, receiving=receiving, answers=rule.answers)
@@ -252,18 +258,47 @@ def _before_start(
 
 
 def standing_points_W(world: World) -> FloatArray:
-    """Points (N, 2) where people may start under any seed: a grid over each person's range."""
-    places = list[tuple[float, float]]()
+    """Points (N, 2) where people may start under any seed."""
+    points = [point for rule in world.seed_rules.people for point in standing_W(world, rule)]
+    return np.array(points).reshape(-1, 2)
+
+
+def standing_W(world: World, rule: PersonRule) -> list[Point]:
+    """Points where a person may start under any seed: one, or a grid over the person's ranges."""
+    if rule.pose is not None:
+        return [(rule.pose.x, rule.pose.y)]
+    if rule.ranges is None:
+        assert rule.route is not None
+        return [point_route(rule.route, world.standing).stops[0].at_W] if rule.route.waypoints else []
+    distance_m, bearing_rad, _ = rule.ranges
+    places = list[Point]()
+    for distance, bearing in itertools.product(np.linspace(*distance_m, 3), np.linspace(*bearing_rad, 5)):
+        direction = world.start.yaw_rad + bearing
+        x, y = world.start.x_m + distance * np.cos(direction), world.start.y_m + distance * np.sin(direction)
+        places.append((float(x), float(y)))
+    return places
+
+
+def overlaps(
+    world: World, objects: Sequence[Placement], scenery: Sequence[tuple[str, FloatArray]]
+) -> Iterator[tuple[PersonRule, str]]:
+    """Yields each person who may stand inside another, an object or scenery, with a sentence on it.
+
+    `scenery` has the outlines (K, 2) of furniture and walls, with names. People who walk on pass through each other.
+    """
+    solid = [(name, shapely.Polygon(outline)) for name, outline in scenery]
+    solid += [(each.name, shapely.Polygon(outline_of(each))) for each in objects]
+    before = list[tuple[str, shapely.Geometry]]()
     for rule in world.seed_rules.people:
-        if rule.ranges is not None:
-            distance_m, bearing_rad, _ = rule.ranges
-            for distance, bearing in itertools.product(np.linspace(*distance_m, 3), np.linspace(*bearing_rad, 5)):
-                direction = world.start.yaw_rad + bearing
-                x, y = world.start.x_m + distance * np.cos(direction), world.start.y_m + distance * np.sin(direction)
-                places.append((float(x), float(y)))
-        elif rule.route is not None and rule.route.waypoints:
-            places.append(point_route(rule.route, world.standing).stops[0].at_W)
-    return np.array(places).reshape(-1, 2)
+        own = shapely.MultiPoint(standing_W(world, rule))
+        walks_on = rule.route is not None and (rule.route.loop or rule.route.wanders or rule.route.follows is not None)
+        for name, shape in (*solid, *(() if walks_on else before)):
+            if shapely.dwithin(own, shape, BODY_RADIUS_M):
+                x, y = shapely.shortest_line(own, shape).coords[0]
+                yield rule, f"{rule.name} would stand in {name} at ({x:.2f}, {y:.2f})"
+                break
+        if not walks_on:
+            before.append((rule.name, own.buffer(BODY_RADIUS_M)))
 
 
 def outline_of(placement: Placement) -> FloatArray:

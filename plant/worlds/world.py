@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from executive.words.knowledge import Knowledge
+from executive.words.knowledge import Knowledge, Pose
 from executive.words.mission import Route, Stop
 from plant.models.catalogue import ImportedObject, load_catalogue, read_imported
 from plant.worlds.geometry_files import check_directives, check_model
@@ -73,13 +73,14 @@ class ObjectRule(_Strict):
 
 
 class PersonRule(_Strict):
-    """A person who walks on a route, or stands within three ranges in front of the robot's start pose.
+    """A person who walks on a route, or stands at a pose or within three ranges in front of the robot's start pose.
 
-    With both, the person walks to the waypoints from a pose within the ranges.
+    With a route and one of these, the person walks to the waypoints from there.
     """
 
     name: str = Field(description="the person's name in knowledge.yaml")
     model: str = Field(default="person", description="a class of `plant/models/catalogue.yaml`")
+    pose: Pose | None = Field(default=None, description="where the person stands, and the direction that they face")
     distance_m: Distances | None = Field(default=None, description="least and greatest distance from the start pose")
     bearing_rad: Angles | None = Field(default=None, description="least and greatest bearing, seen from the start pose")
     turned_rad: Angles | None = Field(default=None, description="least and greatest turn away from facing the robot")
@@ -91,8 +92,11 @@ class PersonRule(_Strict):
 
     @model_validator(mode="after")
     def _walks_or_stands(self) -> PersonRule:
-        if self.route is None and self.ranges is None:
-            raise ValueError("give 'route', or 'distance_m', 'bearing_rad' and 'turned_rad', or all of them")
+        given = (self.distance_m, self.bearing_rad, self.turned_rad)
+        if self.pose is not None and given != (None, None, None):
+            raise ValueError("'pose' says where the person stands; leave out 'distance_m', 'bearing_rad', 'turned_rad'")
+        if self.route is None and self.pose is None and self.ranges is None:
+            raise ValueError("give 'pose', or 'route', or 'distance_m', 'bearing_rad' and 'turned_rad'")
         return self
 
     @property
@@ -438,7 +442,7 @@ def _check_people(rules: SeedRules, standing: Mapping[str, Point]) -> None:
         taken.add(name)
     for index, rule in enumerate(rules.people):
         path, waypoints = ("people", index, "route"), () if rule.route is None else rule.route.waypoints
-        if rule.ranges is None and not waypoints:
+        if rule.pose is None and rule.ranges is None and not waypoints:
             raise WorldError(f"{rule.name} stands nowhere at first; give the route a first waypoint", path=path)
         for at in (each.at if isinstance(each, Stop) else each for each in waypoints):
             if isinstance(at, str) and at not in standing:

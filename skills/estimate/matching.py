@@ -157,3 +157,8 @@ def _score(
                 scores[k] += max(0.0, 1.0 - (distance[i, j] / reach) ** 2)
     scores /= max(1, points.shape[0])
     return scores
+
+
+def match_scan() -> None:
+    """Localises in a small map, so that the code is compiled (`errand.kernels`)."""
+    score_poses(GridMap(np.eye(4, dtype=bool), 0.05, (0.0, 0.0)), np.ones((2, 3)), np.ones((1, 3)))

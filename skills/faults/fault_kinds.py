@@ -218,7 +218,7 @@ def joints_under_pull(joints: Joints, capabilities: Capabilities, force_n: float
 
 
 def _pull(match: re.Match[str]) -> Effect:
-    force_n = float(match["force"])
+    force_n = _number(match, "force", 1000.0, "N")
 
     def act(call: Call) -> Any:
         return joints_under_pull(call.proceed(), call.robot.capabilities(), force_n)
@@ -228,7 +228,7 @@ def _pull(match: re.Match[str]) -> Effect:
 
 def _jumps(match: re.Match[str]) -> Effect:
     """Fault that shifts dead reckoning in odometry, scans and pictures, once and ahead; later motion is right."""
-    ahead_m = np.array([float(match["metres"]), 0.0, 0.0])
+    ahead_m = np.array([_number(match, "metres", 100.0, "m"), 0.0, 0.0])
 
     def act(call: Call) -> Any:
         reading = call.proceed()
@@ -242,6 +242,19 @@ def _jumps(match: re.Match[str]) -> Effect:
         return None if reading is None else replace(reading, X_OB=shift @ reading.X_OB)
 
     return Effect(frozenset(("odometry", "scan", "image")), act)
+
+
+def _falls(match: re.Match[str]) -> Effect:
+    """Fault by which the battery reports a charge."""
+    charge = _number(match, "percent", 100.0, "%") / 100.0
+    return _reads("battery", lambda reading: replace(reading, charge=charge))
+
+
+def _number(match: re.Match[str], group: str, most: float, unit: str) -> float:
+    """Number in the words of a fault. Raises ValueError if it is above `most`."""
+    if abs(number := float(match[group])) > most:
+        raise ValueError(f"'{match[0]}' is more than there can be; write {most:g} {unit} at most")
+    return number
 
 
 def _lease(_: re.Match[str]) -> Effect:
@@ -375,7 +388,7 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
         r"battery falls to (?P<percent>\d+(?:\.\d+)?) ?%",
         "battery falls to 5 % at 3 s",
         "the battery reports this charge",
-        lambda match: _reads("battery", lambda reading: replace(reading, charge=float(match["percent"]) / 100.0)),
+        _falls,
     ),
     FaultKind(
         r"robot reports (?P<fault>\w[\w -]*?)",

@@ -87,6 +87,7 @@ def one_line(text: str) -> str:
 
 _SHORTAGES: Final = {
     "the disk is full": (errno.ENOSPC, errno.EDQUOT, "SQLITE_FULL"),
+    "a file may not grow further (ulimit -f)": (errno.EFBIG,),
     "too many files are open": (errno.EMFILE, errno.ENFILE),
     "there is too little memory": (errno.ENOMEM, MemoryError, "SQLITE_NOMEM"),
 }

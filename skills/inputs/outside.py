@@ -15,6 +15,7 @@ from skills.inputs.errors import InputError
 TEXT_BYTES: Final = 1_000_000
 """Most bytes of a text, unless a reader sets another limit."""
 _LARGE_FILE: Final = b"version https://git-lfs.github.com/spec/"
+_COMPRESSED: Final = {b"\x1f\x8b": "gunzip", b"BZh": "bunzip2", b"\xfd7zXZ": "unxz", b"\x28\xb5\x2f\xfd": "unzstd"}
 _ADDRESS: Final = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")
 _UTF16: Final = (b"\xff\xfe", b"\xfe\xff")
 _UTF8_MARK: Final = b"\xef\xbb\xbf"
@@ -140,6 +141,9 @@ def _opened(file: Path, hint: str, line: int | None = None) -> Iterator[BinaryIO
 def _refuse_content(content: bytes, file: Path, most_bytes: int, line: int | None = None) -> None:
     if len(content) > most_bytes:
         raise _too_large(file, most_bytes, line)
+    for head, command in _COMPRESSED.items():
+        if content.startswith(head):
+            raise InputError("it is compressed", hint=f"unpack it: {command} {file.name}", file=file, line=line)
     if content.startswith(_LARGE_FILE):
         what = "it is a pointer of Git LFS, and the file itself is not there"
         raise InputError(what, hint="fetch it by `git lfs pull`", file=file, line=line)
@@ -180,10 +184,18 @@ def json_object(content: bytes, *, what: str, hint: str) -> dict[str, Any]:
     """Parses a JSON object; an empty text is an empty object. `what` names it in the error, as in "the values".
 
     Raises:
-        InputError: it is no object, is nested too deep, or holds a number or a text that cannot be used.
+        InputError: it is no object, is nested too deep, has a key twice, or holds a number or a text of no use.
     """
+
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        """Object of keys and values."""
+        keys = [key for key, _ in pairs]
+        if twice := next((key for key in keys if keys.count(key) > 1), ""):
+            raise InputError(f"{what} have '{twice[:60]}' twice", hint="give it once")
+        return dict(pairs)
+
     try:
-        values = json.loads(content) if content.strip() else {}
+        values = json.loads(content, object_pairs_hook=once) if content.strip() else {}
         json.dumps(values, ensure_ascii=False).encode()  # halves of characters cannot be sent back
     except (ValueError, RecursionError):
         values = None

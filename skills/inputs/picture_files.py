@@ -29,6 +29,8 @@ _ANY_PNM: Final = re.compile(rb"P[1-6]" + (_SPACE + rb"(\d{1,9})") * 2)
 _COMMENT: Final = re.compile(rb"#[^\n\r]*")
 _NUMBERS: Final = re.compile(rb"[\d\s]*")
 _TRANSPARENT_GREY: Final = b"tRNS"
+_PHONES: Final = frozenset(b"ftyp" + brand for brand in (b"heic", b"heix", b"hevc", b"heim", b"heis", b"mif1", b"msf1"))
+"""Begin of HEIC files, behind their first length."""
 _HINT: Final = "name a file in PNG, JPEG, WebP, TIFF or BMP"
 
 
@@ -184,6 +186,9 @@ def _unreadable(file: Path, content: bytes) -> InputError:
         return InputError("it is empty", hint="name a picture file", file=file)
     if cv2.haveImageReader(str(file)):
         return InputError("the picture is damaged or cut off", hint="copy or make it again", file=file)
+    if content[4:12] in _PHONES:
+        hint = f"save it as JPEG: heif-convert {file.name} {file.stem}.jpg"
+        return InputError("it is HEIC, as phones take photographs", hint=hint, file=file)
     return InputError("it is no picture", hint=_HINT, file=file)
 
 

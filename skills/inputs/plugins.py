@@ -17,8 +17,23 @@ from skills.inputs.errors import InputError
 CLASSES: Final = "errand.classes"
 """Group of the packages with classes of objects; the value names the package, whose code does not run."""
 
+TASKS: Final = "errand.tasks"
+"""Group of the classes of tasks by word (`executive.tree.task_page.TaskPage`)."""
+NODES: Final = "errand.nodes"
+"""Group of the modules with nodes for the trees of tasks."""
+SENTENCES: Final = "errand.sentences"
+"""Group of the functions that add the steps of a clause that they understand to a sentence's builder."""
+STACKS: Final = "errand.stacks"
+"""Group of the names of stack files; the value names the package with the file `NAME_stack.yaml`."""
 KERNELS: Final = "errand.kernels"
 """Group of the functions without arguments that run numeric code for a short time, so that it is compiled."""
+
+RECOGNISERS: Final = "errand.recognisers"
+"""Group of the functions that extend a detector by objects of a world (`skills.detection.Recogniser`)."""
+OBSERVERS: Final = "errand.observers"
+"""Group of the functions that return a visitor for a run (`errand run --observe NAME=VALUE`, or `--NAME VALUE`)."""
+FUNCTIONS: Final = (KERNELS, RECOGNISERS, SENTENCES)
+GROUPS: Final = (CLASSES, NODES, TASKS, STACKS, *FUNCTIONS, OBSERVERS)
 
 OURS: Final = "spot-errand"
 """Distribution of this project, whose modules need no time limit."""
@@ -59,16 +74,21 @@ def class_tables(name: str) -> Iterator[tuple[Path, Any]]:
     from skills.inputs.yaml_source import read_yaml
 
     for entry in sorted(installed_plugins(CLASSES), key=lambda entry: entry.name):
-        try:
-            spec = find_spec(entry.value)
-        except (ImportError, ValueError):
-            spec = None
-        if spec is None or not spec.submodule_search_locations:
-            what = f"{entry.value} of distribution {distribution_of(entry)}, which has classes, is no package"
-            raise InputError(what, hint="repair or uninstall that distribution")
-        file = Path(spec.submodule_search_locations[0]) / name
+        file = package_folder(entry) / name
         if file.is_file():
             yield file, read_yaml(file).data
+
+
+def package_folder(entry: EntryPoint) -> Path:
+    """Folder of the package that an entry point names, whose code does not run. Raises InputError."""
+    try:
+        spec = find_spec(entry.value)
+    except (ImportError, ValueError):
+        spec = None
+    if spec is None or not spec.submodule_search_locations:
+        what = f"{entry.value} of distribution {distribution_of(entry)}, for {entry.group}, is no package"
+        raise InputError(what, hint="repair or uninstall that distribution")
+    return Path(spec.submodule_search_locations[0])
 
 
 def class_entries(name: str, kind: type[ResultT]) -> Iterator[tuple[Path, dict[str, ResultT]]]:

@@ -1,12 +1,13 @@
 """Checks YAML documents against pydantic models; errors name the line and what would fit."""
 
+import re
 import sys
 from collections.abc import Mapping
 from itertools import pairwise
 from types import MappingProxyType, UnionType
 from typing import Annotated, Any, Final, ForwardRef, TypeVar, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
 from typing_extensions import TypeAliasType
 
@@ -21,6 +22,19 @@ Name = Annotated[str, Field(min_length=1, pattern=rf"^ *{_FIRST}[^\x00-\x1f\x7f]
 """A name in a file: a text on one line."""
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
+
+
+def matching(pattern: str, what: str, hint: str) -> AfterValidator:
+    """Validator of a text by a pattern; an error says `what` it should be, and the `hint`."""
+
+    def checked(text: str) -> str:
+        if re.fullmatch(pattern, text) is None:
+            raise QuantityError(what, hint)
+        return text
+
+    return AfterValidator(checked)
+
+
 MOST_ERRORS: Final = 500
 """Errors of one file that are considered."""
 _PLAIN_WORDS: Final[Mapping[str, str]] = MappingProxyType(

@@ -111,7 +111,10 @@ def parse_yaml(text: str, file: Path, tags: frozenset[str] = frozenset()) -> Yam
 
 def scalar_of(text: str) -> Any:
     """Parses one scalar as a file holds it. Raises yaml.YAMLError or ValueError when it is broken or no scalar."""
-    node = yaml.compose(text, Loader=yaml.SafeLoader)
+    try:
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+    except RecursionError as error:
+        raise ValueError("nested too deeply") from error
     if node is None:
         return None
     if not isinstance(node, yaml.ScalarNode):

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from skills.robot import CommandCause, CommandId, CommandState, Pose2D
 from skills.routine import Patience, Routine, RoutineSkill, SkillFailure
 
 _LOOK_AHEAD_S, _BRAKING_M_S2 = 0.4, 2.0
+_STOPPED_BY_ROBOT: Final = (CommandCause.ESTOPPED, CommandCause.UNPOWERED, CommandCause.FAULT)
 
 
 class Base:
@@ -71,11 +73,11 @@ class Base:
         return velocity[0] * share, velocity[1] * share, velocity[2] * share
 
     def refusal(self) -> str | None:
-        """Reason why the robot refused the last command; None when it accepted the command."""
+        """Reason why the robot refused or stopped the last command; None when it carries it out."""
         if self._command is None:
             return None
         status = self._context.robot.command_status(self._command)
-        if status.state is CommandState.REFUSED:
+        if status.state is CommandState.REFUSED or status.cause in _STOPPED_BY_ROBOT:
             self._cause = status.cause
             return status.reason or "no reason given"
         self.accepted = True

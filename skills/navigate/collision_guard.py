@@ -10,11 +10,10 @@ import numpy as np
 
 from skills.api import ReturnsView, SkillContext
 from skills.footprint import Footprint, disc_centres, outline_distances_m
-from skills.path import progress_m
+from skills.path import LocalController, progress_m
 from skills.perception.moving_objects import Moving, MovingOptions, MovingWatch
 from skills.quantities import Acceleration, Count, Delay, Duration, Length, Margin, Speed, Turn
 from skills.robot import FloatArray, Pose2D
-from skills.stack import LocalController
 
 Place = tuple[float, float]
 _STEP_S = 0.1

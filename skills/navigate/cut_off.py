@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import ClearableCostmap, FreeSpace, SkillContext
-from skills.doorway import DoorState, Doorway, measure_opening
+from skills.doorway import CLOSED_M, FLATTEST_RAD, REACH_M, DoorState, Doorway, look_at_doors
 from skills.footprint import Footprint, clearance_on_grid, with_segments
 from skills.quantities import Delay, Length, Margin, Turn
 from skills.robot import FloatArray, Pose2D
@@ -25,7 +25,6 @@ _NEAR_M = 0.3
 """Radius within which a blocked robot looks for its region."""
 _BESIDE_M = (0.4, 0.55, 0.7, 0.9)
 """Distances from a door at which its two sides are looked up."""
-_FEW_RAYS = 50
 _PANEL_M = 0.05
 """Half the thickness of a closed door."""
 _JUDGED_M = 1.5
@@ -47,9 +46,9 @@ class DoorOptions:
     how long a door with a plug-in may take to open.
     """
 
-    reach_m: Length = 4.0
-    flattest_rad: Turn = 1.25
-    closed_m: Margin = 0.1
+    reach_m: Length = REACH_M
+    flattest_rad: Turn = FLATTEST_RAD
+    closed_m: Margin = CLOSED_M
     patience_s: Delay = 3.0
     look_s: Delay = 1.0
     trust_s: Delay = 120.0
@@ -64,8 +63,6 @@ class DoorWatch:
         self._context, self.options = context, options or DoorOptions()
         self._sure_since_s = context.clock.now() - self.options.sure_s
         self._doubted: frozenset[Doorway] = frozenset()
-        sides = [y for _, y in context.robot.capabilities().footprint_m]
-        self._width_m = max(sides) - min(sides)
 
     @property
     def closed(self) -> tuple[Doorway, ...]:
@@ -80,21 +77,9 @@ class DoorWatch:
 
     def look(self) -> None:
         """Updates the states of the doors in view from the newest scan."""
-        scan, estimate = self._context.robot.scan(), self._context.localiser.estimate()
-        if not self._context.doors or scan is None or not estimate.localised:
-            return
-        X_WL, options, memory = estimate.X_WO @ scan.X_OB @ scan.X_BL, self.options, self._context.door_memory
-        place = float(X_WL.translation()[0]), float(X_WL.translation()[1])
-        for door in self._context.doors:
-            if door.distance_m(place) > options.reach_m or door.view_angle_rad(place) > options.flattest_rad:
-                continue
-            seen = measure_opening(door, [(scan, X_WL)])
-            if seen.rays >= _FEW_RAYS and seen.most_m <= options.closed_m:
-                memory.note(door, DoorState.CLOSED, scan.stamp_s)
-            elif seen.least_m >= self._width_m:
-                memory.note(door, DoorState.OPEN, scan.stamp_s)
-            elif seen.least_m > options.closed_m and memory.last_seen(door).state is DoorState.CLOSED:
-                memory.note(door, DoorState.UNKNOWN, scan.stamp_s)
+        context, options = self._context, self.options
+        limits = {"reach_m": options.reach_m, "flattest_rad": options.flattest_rad, "closed_m": options.closed_m}
+        look_at_doors(context.doors, context.door_memory, context.robot, context.localiser, **limits)
 
     def doubt(self, doors: Sequence[Doorway]) -> bool:
         """Lets plans pass through those `doors` that the robot has not seen lately, so that it looks at them again.

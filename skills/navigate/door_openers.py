@@ -3,19 +3,20 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Final
-
-from pydantic import Field
+from typing import Annotated, Final, Literal
 
 from skills.api import Job, SkillContext
 from skills.doorway import DoorOpener, Doorway
 from skills.geometry import relative_pose
+from skills.inputs.schema import matching
 from skills.quantities import Angle, Coordinate, Duration, Height
 from skills.robot import DoorHandle, Pose2D
 
 _LATENCY_S: Final = 0.5
-Url = Annotated[str, Field(pattern=r"^https?://[^\s/]+\S*$")]
-Method = Annotated[str, Field(pattern="^(GET|POST|PUT|PATCH)$")]
+Url = Annotated[
+    str, matching(r"https?://[^\s/]+\S*", "should be the address of an HTTP call", "write http://HOST/PATH")
+]
+Method = Literal["GET", "POST", "PUT", "PATCH"]
 
 
 @dataclass(frozen=True)

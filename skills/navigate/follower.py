@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from skills.footprint import Footprint, disc_centres, footprint_clearance_m
 from skills.geometry import wrap
-from skills.path import TURN_M_PER_RAD, Path
+from skills.path import TURN_M_PER_RAD, Drive, Path
 from skills.quantities import Acceleration, Delay, Duration, Factor, Length, Margin, Speed, TurnAcceleration, TurnRate
 from skills.robot import BaseKind, FloatArray, Pose2D
 from skills.world_model import FreeSpace
@@ -58,19 +58,6 @@ class FollowerOptions:
     def build(self, path: Path, footprint: Footprint, *, max_speed_m_s: float) -> PathFollower:
         """Creates a follower for one path with a speed limit."""
         return PathFollower(path, footprint, replace(self, max_speed_m_s=min(self.max_speed_m_s, max_speed_m_s)))
-
-
-@dataclass(frozen=True)
-class Drive:
-    """Command for one tick: body-frame velocity, remaining path (m, turns included), and distance from it (m).
-
-    `blocked_at` is the world (x, y) of the obstacle that blocks the path ahead; None when the path is clear.
-    """
-
-    velocity: tuple[float, float, float]
-    remaining_m: float
-    off_path_m: float
-    blocked_at: tuple[float, float] | None
 
 
 class PathFollower:

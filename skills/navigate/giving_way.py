@@ -25,10 +25,9 @@ from skills.footprint import (
     pose_array,
     with_outlines,
 )
-from skills.path import progress_m
+from skills.path import LocalController, progress_m
 from skills.quantities import Count, Delay, Length, Margin
 from skills.robot import FloatArray, Pose2D
-from skills.stack import LocalController
 from skills.world_model import Neighbour
 
 _PATH_STEP_M = 0.12

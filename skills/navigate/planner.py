@@ -8,7 +8,7 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.api import NO_WORK_COUNTER, FreeSpace, PlanningError, WorkCounter
+from skills.api import FreeSpace, PlanningError
 from skills.footprint import SAFE_MARGIN_M, ClearanceField, Footprint, clearance_at, clearance_on_grid
 from skills.geometry import wrap
 from skills.motion_cost import NO_ZONES, TURNING_RADIUS_M, Needs, Space, Weights, ZoneCosts, segment_cost
@@ -17,7 +17,7 @@ from skills.navigate.lattice import Lattice, cost_to_go, lattice_moves, search
 from skills.path import Path, clearances, densify, relax, shortcut
 from skills.quantities import Count, Factor, Length, Margin, Speed, TurnRate
 from skills.robot import BaseKind, FloatArray, Pose2D
-from skills.world_model import ZoneKind, zones_sentence
+from skills.world_model import NO_WORK_COUNTER, WorkCounter, ZoneKind, zones_sentence
 from skills.zone_map import ZoneMap
 
 FIELD_CELL_M = 0.05

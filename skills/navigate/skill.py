@@ -14,14 +14,12 @@ from skills.footprint import Footprint, footprint_clearance_m
 from skills.geometry import relative_pose
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import Base
-from skills.navigate.follower import Drive
 from skills.navigate.giving_way import Avoided
 from skills.navigate.surroundings import Company, NavigateInputs, NavigateOptions, Surroundings
 from skills.navigate.trip_planning import TripPlanning, place_text
-from skills.path import Path
+from skills.path import Drive, LocalController, Path
 from skills.robot import Pose2D
 from skills.routine import Patience, Routine, RoutineSkill, SkillFailure
-from skills.stack import LocalController
 
 _STILL_THERE_M = 1.0
 _REVIEWED_M = 0.02

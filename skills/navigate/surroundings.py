@@ -15,13 +15,12 @@ from skills.navigate.collision_guard import CollisionGuard, GuardOptions
 from skills.navigate.cut_off import DoorOptions, DoorWatch
 from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions
 from skills.navigate.sensor_watch import LowObstacleWatch, ScanHealth, ScanHealthOptions, WatchOptions
-from skills.path import progress_m
+from skills.path import LocalController, progress_m
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.quantities import Coordinate, Delay, Duration, Length, Margin, Speed, Tries, Turn, TurnRate
 from skills.robot import FloatArray, Pose2D
 from skills.routine import PATIENCE_S
-from skills.stack import LocalController
 from skills.world_model import Zone, ZoneKind
 from skills.zone_map import KeepOut, ZoneMap
 

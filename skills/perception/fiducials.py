@@ -12,6 +12,7 @@ of a tag is the side of its black square. A detector adds the objects with tags 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
 from typing import Any, Final
 
 import cv2
@@ -197,7 +198,7 @@ _BELOW_M: Final = 0.004
 """Distance by which the surface below an object lies at least below its tag."""
 
 
-def with_tags(detector: Detector, tags: Iterable[Tag]) -> Detector:
+def with_tags(detector: Detector, folders: Sequence[Path], tags: Sequence[Tag]) -> Detector:
     """Returns a detector that also recognises the objects with these tags; the same one when no object has a tag."""
     carried = {tag.id: tag for tag in tags if tag.on is not None and tag.p_W is None}
     return TagDetector(detector, tuple(carried.values())) if carried else detector

@@ -12,7 +12,7 @@ view describes its edges and its shading (Dalal and Triggs, "Histograms of Orien
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -30,6 +30,7 @@ from skills.perception.object_model import VIEW_SIDE, ObjectModel, read_model, v
 from skills.perception.point_cloud import MIN_DEPTH_M, camera_pose_W, closed_mask, nearest_pixels, project
 from skills.perception.surface_segmentation import Cluster, segment_3d
 from skills.robot import FloatArray, Image
+from skills.world_model import Tag
 
 _TURNS: Final = 24
 """Number of turns about the vertical that are tried."""
@@ -388,9 +389,9 @@ def _detected(fit: Fit, segment: Detection3D) -> Detection3D:
     )
 
 
-def with_models(detector: Detector, folders: Iterable[Path | str]) -> Detector:
+def with_models(detector: Detector, folders: Iterable[Path], tags: Sequence[Tag] = ()) -> Detector:
     """Adds the models in these folders to a detector; the same detector for no folder. Raises InputError."""
-    models = [read_model(Path(folder)) for folder in folders]
+    models = [read_model(folder) for folder in folders]
     return ModelDetector(detector, models) if models else detector
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
-from skills.api import Detection, Detector, SurveyView
+from skills.api import Detection, Detector, ObjectKind, ObjectObservation, SurveyView
 from skills.estimate.scan_points import placed_points, scan_points
 from skills.perception.detector.camera_images import detect_class_in_grey, fresh_image
 from skills.perception.point_cloud import grid_labels
@@ -21,6 +21,7 @@ from skills.perception.position import locate
 from skills.robot import CameraCapabilities, Clock, FloatArray, Image, NoImageError, Pose2D, Robot, Scan
 from skills.world_model import PERSON
 
+_PERSON_SIZE_M = (0.5, 0.5, 1.7)
 _CELL_M = 0.05
 _LOWEST_M = 0.8
 _HIGHEST_M = 1.8
@@ -224,3 +225,9 @@ def cameras_towards(velocity: FloatArray, known: Sequence[CameraCapabilities]) -
     elif vx < 0.0:
         heading_rad = math.pi
     return tuple(camera for camera in known if camera.looks_towards(heading_rad))
+
+
+def person_observation(seen: SeenPerson, name: str, place: str | None) -> ObjectObservation:
+    """Observation of a person under a name."""
+    middle_W = (*seen.place_W, _PERSON_SIZE_M[2] / 2)
+    return ObjectObservation(seen.stamp_s, ObjectKind(name), middle_W, _PERSON_SIZE_M, 0.0, seen.score, place)

@@ -1,24 +1,28 @@
-"""The back_off skill: drives a short distance to where there is more clearance."""
+"""Skills that make room: back_off drives to where there is more clearance, step_aside out of a reserved path."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Final
 
 import numpy as np
 
-from skills.api import Cause, Part, Running, SkillContext, Succeeded
+from skills.api import Cause, Failed, Part, Running, Skill, SkillContext, Step, Succeeded
 from skills.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
 from skills.geometry import compose, relative_pose
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import MovingSkill
+from skills.navigate.giving_way import GivingWay
 from skills.navigate.sensor_watch import ScanHealth
+from skills.navigate.skill import Navigate
+from skills.navigate.surroundings import NavigateInputs
 from skills.quantities import Delay, Length, Speed
 from skills.robot import BaseKind, Pose2D
 from skills.routine import PATIENCE_S, Routine, SkillFailure
 
 DIRECTIONS_RAD = tuple(math.radians(degrees) for degrees in (180, 150, -150, 90, -90, 30, -30, 0))
 """Directions in the body frame, backwards first; a base that cannot go sideways uses the first and the last."""
+_STAYS: Final = Succeeded("stands in nobody's way")
 _STEP_M = 0.05
 """Distance between the checks of a direction."""
 
@@ -119,3 +123,58 @@ class BackOff(MovingSkill[BackOffInputs]):
         allowed = np.minimum(SAFE_MARGIN_M, np.maximum.accumulate(clearances)[:-1] + 1e-3)
         blocked = np.flatnonzero(clearances[1:] < allowed)
         return float(steps[-1] if len(blocked) == 0 else (steps[blocked[0] - 1] if blocked[0] > 0 else 0.0))
+
+
+@dataclass(frozen=True)
+class StepAsideInputs:
+    """No inputs."""
+
+
+class StepAside(Skill[StepAsideInputs]):
+    """Drives to a place off all reserved paths when the robot stands in the path of one with the right of way.
+
+    Succeeds at once when it stands in nobody's way. Uses navigate.
+    """
+
+    name = "step_aside"
+    Inputs = StepAsideInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
+    causes: ClassVar[Mapping[Cause, str]] = {
+        **Navigate.causes,
+        Cause.PLANNING: "it stands in the way, and no other place is free, or no path leads there",
+    }
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5}
+
+    def __init__(self, context: SkillContext) -> None:
+        super().__init__(context)
+        self._navigate = Navigate(context)
+        self._stays: Succeeded | Failed | None = _STAYS
+        self._giving = GivingWay(context, self._navigate.options.giving_way)
+
+    def begin(self, inputs: StepAsideInputs) -> None:
+        """Begins to drive away if a robot needs the space and another place is free."""
+        self._stays = self._begun()
+
+    def _begun(self) -> Succeeded | Failed | None:
+        """Begins the drive; returns why the robot stays, or None."""
+        context = self.context
+        if not context.localiser.estimate().localised:
+            return Failed(Cause.PRECONDITION, "the robot does not know where it is")
+        here, footprint = context.pose(), self._navigate.outline()
+        if not self._giving.blocked_robots(here, footprint):
+            return _STAYS
+        place = self._giving.waiting_pose(context.free_space(), footprint, here)
+        if place is None:
+            return Failed(Cause.PLANNING, "stands in the way of another robot, and no other place is free")
+        self._navigate.begin(NavigateInputs(place))
+        return None
+
+    def step(self) -> Step:
+        """Drives on, or says why the robot stays."""
+        return self._stays or self._navigate.step()
+
+    def end(self) -> None:
+        """Ends the drive."""
+        if self._stays is None:
+            self._stays = _STAYS
+            self._navigate.end()

@@ -2,18 +2,20 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, ObjectObservation, Running, Succeeded
+from skills.capabilities import CameraCapabilities, Capabilities, Mount
+from skills.inputs.errors import suggestion
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import overview_viewpoints
 from skills.perception.detector.camera_images import is_dark
 from skills.perception.point_cloud import nearest_pixels, project
 from skills.quantities import Coordinate, Height
-from skills.robot import CameraCapabilities, FloatArray, Image, Mount
+from skills.robot import FloatArray, Image
 from skills.routine import Patience, PlanningAttempt, Routine, SkillFailure
 
 _ASIDE_RAD: Final = (0.0, 0.35, -0.35)
@@ -58,6 +60,20 @@ class TakePicture(LookingSkill[TakePictureInputs]):
     max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 1.0, "joints": 0.5, "gripper": 0.5}
     _camera: CameraCapabilities | None = None
 
+    @classmethod
+    def refuses(cls, inputs: Mapping[str, Any], capabilities: Capabilities) -> tuple[str, str] | None:
+        """Error and hint for a camera that the robot lacks, or that is lower than the top to be seen."""
+        named, cameras = inputs.get("camera", ""), {each.source: each for each in capabilities.cameras}
+        camera = cameras.get(_source(named))
+        if named and camera is None:
+            hint = suggestion(_source(named), cameras) if cameras else "choose another kind of robot"
+            return f"the robot has no camera '{named}'", hint
+        if camera is None or not inputs.get("top") or camera.mount is not Mount.BODY:
+            return None
+        high_m, top_m = capabilities.standing_height_m + float(camera.X_FC.translation()[2]), inputs["point_W"][2]
+        what = f"the {camera.source} camera, {high_m:.2f} m high, does not see a top {top_m:g} m high"
+        return (what, "leave the camera out, or name a higher one") if high_m <= top_m else None
+
     @property
     def object_camera(self) -> CameraCapabilities:
         """Camera that takes the picture."""
@@ -99,7 +115,7 @@ class TakePicture(LookingSkill[TakePictureInputs]):
         if not named:
             first = self.object_camera
             return (first, *(each for each in cameras if each is not first))
-        if known := [each for each in cameras if each.source == named.lower().replace(" ", "")]:
+        if known := [each for each in cameras if each.source == _source(named)]:
             return known
         what = f"the robot has no camera '{named}'; it has {', '.join(each.source for each in cameras)}"
         raise SkillFailure(Cause.PRECONDITION, what)
@@ -141,3 +157,8 @@ def _hidden(image: Image, p_CT: FloatArray) -> str | None:
         return f"no depth shows whether something hides it, {away_m:.1f} m away"
     before_m = away_m - float(np.median(measured_m))
     return f"something {before_m:.1f} m before it hides it" if before_m > _HIDES_M else None
+
+
+def _source(named: str) -> str:
+    """Source of a camera named by a user."""
+    return named.lower().replace(" ", "")

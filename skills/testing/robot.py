@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from skills.command_table import Active, LeaseManager, ScriptedCommands
+from skills.command_table import Active, LeaseManager, ScriptedCommands, refusal_of
 from skills.faults.fault_kinds import joints_under_pull
 from skills.geometry import compose
 from skills.manipulation.arm.kinematics import ArmModel, arm_model
@@ -215,10 +215,9 @@ class ScriptedRobot:
 
     def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
         """Drives at a body-frame velocity until the clock reads until_s."""
-        fault = "" if all(map(math.isfinite, (vx, vy, wz))) else f"velocity ({vx}, {vy}, {wz}) is not finite"
-        if vy != 0.0 and self._capabilities.base_kind is BaseKind.DIFFERENTIAL:
-            fault = fault or "this base cannot go sideways"
-        return self._begin("drive", np.array([vx, vy, wz]), until_s, lease, fault)
+        sideways = vy != 0.0 and self._capabilities.base_kind is BaseKind.DIFFERENTIAL
+        fault, velocity = "this base cannot go sideways" if sideways else "", np.array([vx, vy, wz])
+        return self._begin("drive", velocity, until_s, lease, fault, values=(vx, vy, wz))
 
     def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
         """Holds the body origin at a height above the floor and a pitch."""
@@ -258,17 +257,14 @@ class ScriptedRobot:
     def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
         """Points the head, which arrives at once."""
         head = self._capabilities.head
-        fault, lacks = "", "there is no head" if head is None else ""
-        if head is not None:
-            axes = (pan_rad, head.pan_range_rad), (tilt_rad, head.tilt_range_rad)
-            within = all(low <= angle <= high for angle, (low, high) in axes)
-            fault = "" if within else f"the head cannot turn to pan {pan_rad:.2f}, tilt {tilt_rad:.2f} rad"
+        fault, lacks = (None, "there is no head") if head is None else (head.refusal(pan_rad, tilt_rad), "")
         return self._begin("point_head", (pan_rad, tilt_rad), until_s, lease, fault, lacks=lacks)
 
     def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
         """Moves the gripper, which stops at an object between its fingers."""
-        lacks = "" if self._capabilities.gripper is not None else "there is no gripper"
-        return self._begin("set_gripper", (opening, force_n), until_s, lease, lacks=lacks)
+        gripper = self._capabilities.gripper
+        fault, lacks = (None, "there is no gripper") if gripper is None else (gripper.refusal(opening, force_n), "")
+        return self._begin("set_gripper", (opening, force_n), until_s, lease, fault, lacks=lacks)
 
     def carry(self, holding: bool, *, lease: Lease) -> None:
         """Notes whether the gripper must keep its object."""
@@ -315,19 +311,29 @@ class ScriptedRobot:
         return (*driving, *(part for part in self._commands.moving_parts if part != "drive"))
 
     def _begin(
-        self, part: str, goal: object, until_s: float, lease: Lease, fault: str = "", *, lacks: str = "", verb: str = ""
+        self,
+        part: str,
+        goal: object,
+        until_s: float,
+        lease: Lease,
+        fault: str | None = None,
+        *,
+        values: Iterable[float] = (),
+        lacks: str = "",
+        verb: str = "",
     ) -> CommandId:
         self.calls.append(verb := verb or part)
-        causes = (
-            (CommandCause.NO_LEASE, "the lease was taken away" if lease != self._leases.current else ""),
-            (CommandCause.UNSUPPORTED, lacks),
-            (CommandCause.INVALID, fault),
-            (self.refusal_cause, self.refuse_because.get(verb, "")),
+        now_s, taken = self._clock.now(), None if lease == self._leases.current else "the lease was taken away"
+        refusals = (
+            refusal_of(verb, taken, values, until_s=until_s, now_s=now_s),
+            (lacks, CommandCause.UNSUPPORTED),
+            (fault, CommandCause.INVALID),
+            (self.refuse_because.get(verb), self.refusal_cause),
         )
-        for cause, refusal in causes:
-            if refusal:
-                return self._commands.refuse(refusal, cause)
-        return self._commands.begin(part, goal, self._clock.now(), until_s)
+        for why, cause in filter(None, refusals):
+            if why:
+                return self._commands.refuse(why, cause)
+        return self._commands.begin(part, goal, now_s, until_s)
 
     def _X_WB(self) -> RigidTransform:
         return self._tilted(self.pose, self.height_m, self.pitch_rad)

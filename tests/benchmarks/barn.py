@@ -19,11 +19,12 @@ from plant.worlds.world import load_world
 from skills.grid_map import GridMap
 from skills.navigate.skill import NavigateInputs
 from skills.robot import Pose2D
+from skills.stack import stack_file
 from tests.benchmarks.driving import TICK_S, Driver
 from tests.benchmarks.harness import benchmark, quantile, share
 
 NEAR_M, LEFT_M, LIMIT_S, OPTIMAL_M_S = 1.0, 0.1, 100.0, 2.0
-NO_MAP_STACK = Path(__file__).parents[2] / "skills" / "no_map_stack.yaml"
+NO_MAP_STACK = stack_file(Path("no_map"))
 NOTHING = GridMap(np.zeros((2, 2), dtype=bool), 1.0, (0.0, 0.0))
 
 

@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 
 from executive.record.history import read_history
-from executive.record.schemas import DOORS
 from executive.words.knowledge import load_knowledge
+from executive.words.schemas import DOORS
 from plant.worlds.world import load_world
 from skills.grid_map import load_grid_map
 from tests.benchmarks.harness import benchmark, totals

@@ -41,7 +41,6 @@ from executive.run.runner import run
 from executive.run.visitor import RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
-from executive.tree.registry import built_in_skills
 from executive.words.command import parse_command
 from executive.words.leaf_steps import steps_of_commands
 from executive.words.mission import Mission
@@ -55,6 +54,7 @@ from skills.inputs.errors import InputError
 from tests.benchmarks.harness import benchmark, for_each, quantile, share, tell
 from tests.benchmarks.manipulation_room import CLASSES, LOOK_S, ROBOT, SECOND, SURFACES, TAKEN, TARGET, room
 from tests.benchmarks.shapes import written_shape
+from tests.project import core_skills
 
 HELD_S, UPRIGHT_RAD, DISTURBED_M, DISTURBED_RAD, MOVED_M = 10.0, 0.26, 0.05, 0.35, 0.02
 MOTION_WORK, GRASP_WORK = "plan arm motion", "plan grasp"
@@ -263,7 +263,7 @@ def run_case(class_name, surface, clutter, seed, source, folder):
     )
     steps = steps_of_commands([parse_command(each) for each in commands])
     mission = Mission(name="trial", world=str(world.folder), robot=ROBOT, steps=steps)
-    tree = compile_mission(mission, knowledge=knowledge_of(world), registry=built_in_skills())
+    tree = compile_mission(mission, knowledge=knowledge_of(world), registry=core_skills())
     entry = run_entry(simulation.robots[ROBOT], world, tree, start=simulation.starts[ROBOT])
     with LockStepWorker(simulation.clock) as lock_step:
         worker, settings = TimedWorker(lock_step), RunSettings(seed=seed, time_limit_s=600.0)

@@ -14,10 +14,10 @@ from itertools import product
 
 import numpy as np
 
-from executive.record.schemas import SPEECH
+from errand_people.judges import lost_s
 from executive.words.knowledge import load_knowledge
 from executive.words.mission import Distraction, Route
-from plant.referee.findings import lost_s
+from executive.words.schemas import SPEECH
 from plant.referee.object_history import TimedPath
 from plant.worlds.world import load_world
 from tests.benchmarks.harness import benchmark, for_each, totals

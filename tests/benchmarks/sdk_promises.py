@@ -206,7 +206,7 @@ def _refused(line, name, says=_UNKNOWN, exit_code=1):
 REFUSED = {
     "animation_recorder": _refused("animation_recorder.py HOST", "ChoreographyService"),
     "arm_force_control": _refused("force_trajectory.py HOST", "an axis in force mode", _UNSUPPORTED),
-    "arm_impedance_control": _refused("arm_impedance_control_simple.py HOST", "arm_impedance_command", _UNSUPPORTED),
+    "arm_impedance_control": _refused("arm_impedance_control_simple.py HOST", "a feed-forward wrench", _UNSUPPORTED),
     "arm_surface_contact": _refused("arm_surface_contact.py HOST", "ArmSurfaceContactService"),
     "audio_visual": _refused(
         "audio_visual_params/audio_visual_params.py HOST", "AudioVisualService", 'Service name "audio-visual"'
@@ -217,11 +217,9 @@ REFUSED = {
     "disable_ir_emission": _refused(
         "disable_ir_emission.py HOST --disable", "IREnableDisableService", 'Service name "ir-enable-disable-service"'
     ),
-    "get_mission_state": _refused("get_mission_state.py HOST", "MissionService"),
     "joint_control": _refused(
-        "noarm_squat.py HOST", "RobotStateStreamingService", "GetRobotStateStream is not served", exit_code=None
+        "noarm_squat.py HOST", "RobotCommandStreamingService", "JointControlStream is not served", exit_code=None
     ),
-    "mission_question_answerer": _refused("mission_question_answerer.py HOST", "MissionService"),
     "payloads": _refused(
         "payloads.py HOST --payload-credentials-file-1 PAYLOAD --payload-credentials-file-2 PAYLOAD",
         "PayloadRegistrationService",
@@ -242,12 +240,14 @@ SERVED = {
     "fan_command": Program("basic_fan_command.py HOST", exit_code=1, says="STATUS_COMPLETE"),
     "get_depth_plus_visual_image": Program("get_depth_plus_visual_image.py HOST --camera hand --to-depth"),
     "get_image": Program("get_image.py --image-sources hand_color_image HOST"),
+    "get_mission_state": Program("get_mission_state.py HOST", says="STATUS_NONE"),
     "get_robot_state": Program("get_robot_state.py HOST state", says="STATE_NOT_READY"),
     "get_robot_state_async": Program("get_robot_state_async.py HOST", says="SUCCESS"),
     "get_world_objects": Program("get_world_objects.py HOST", says="Fiducial objects"),
     "gripper_camera_params": Program("set_gripper_camera_params.py HOST --brightness 0.5", says="0.5"),
     "log_status": Program("log_status.py HOST active", says="Active Logs"),
     "logging": Program("log_spot_data.py HOST", says="Added robot command log blob"),
+    "mission_question_answerer": Program("mission_question_answerer.py HOST", exit_code=None),
     "ray_cast": Program("cast_single_ray.py HOST -o 0 0 0 -d 1 0 0", says="TYPE_VOXEL_MAP"),
     "service_faults": Program("service_faults.py HOST", exit_code=1, says="Shutting down live-service-test"),
     "tester_programs": Program("image_service_tester.py HOST --service-name image", says="SUCCESS"),

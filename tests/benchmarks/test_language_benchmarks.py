@@ -12,12 +12,12 @@ import yaml
 from executive.language.parser import load_parser
 from executive.language.understand import understand
 from executive.tree.compiler import compile_mission
-from executive.tree.registry import built_in_skills
 from executive.words.knowledge import load_knowledge
 from executive.words.mission import Mission
 from plant.worlds.world import load_world
 from tests.benchmarks.inserted_words import measured
 from tests.benchmarks.same_answers import compare, store
+from tests.project import core_skills
 
 SENTENCE = "Hey Alice, can you fetch me a drink from the kitchen"
 FAMILIES = Path(__file__).parents[1] / "executive" / "language" / "sentences"
@@ -48,7 +48,7 @@ def test_parse_to_compiled_tree(benchmark):
     parser = load_parser()
     parser.parse("go")
     loading_s = time.perf_counter() - begun
-    knowledge, registry = load_knowledge(load_world("flat").knowledge_path), built_in_skills()
+    knowledge, registry = load_knowledge(load_world("flat").knowledge_path), core_skills()
 
     def compiled():
         meant = understand(SENTENCE, parser=parser, knowledge=knowledge, require_wake=True)

@@ -20,8 +20,7 @@ from executive.app.runs.simulated import simulate
 from executive.run.worker import LockStepWorker
 from plant.worlds.seeding import place_objects
 from skills.api import TOUCHES, Running, SkillContext, Succeeded
-from skills.grid_map import load_grid_map
-from skills.manipulation.arm.solid_cells import map_columns
+from skills.grid_map import load_grid_map, map_columns
 from skills.manipulation.grasp.candidates import same_grasp
 from skills.manipulation.grasp.skill import Grasp, GraspInputs
 from skills.manipulation.posture import Stow, StowInputs

@@ -5,13 +5,14 @@ import shlex
 from dataclasses import dataclass
 from pathlib import Path
 
-from executive.cli.entry import COMMANDS, PLUGIN_COMMANDS, plugin_command, shipped_command
+from executive.cli.entry import COMMANDS, help_lines, plugin_command, shipped_command
+from skills.inputs.plugins import OBSERVERS, installed_plugins
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 _COMMANDS = {name: shipped_command(name) for name in COMMANDS}
-_COMMANDS |= {name: plugin_command(name) for name in PLUGIN_COMMANDS if "." not in name}
-for group, short in (name.split(".") for name in PLUGIN_COMMANDS if "." in name):
+_COMMANDS |= {name: plugin_command(name) for name in help_lines() if "." not in name}
+for group, short in (name.split(".") for name in help_lines() if "." in name):
     _COMMANDS[group].add_command(plugin_command(f"{group}.{short}"), short)
 _BLOCK = re.compile(r"(?:^<!-- (?P<mark>[^>]*) -->\n+)?^```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL)
 _LINK = re.compile(r"\]\((?!https?:)([^)#]*)(#[^)]*)?\)")
@@ -58,4 +59,5 @@ def unknown_command(line):
     if command.context_settings.get("allow_interspersed_args") is False:  # options of a program follow it
         rest = rest[: next((k for k, word in enumerate(rest) if word.endswith(".py")), None)]
     known = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
+    known |= {f"--{each.name}" for each in installed_plugins(OBSERVERS)} if "--observe" in known else set()
     return next((f"{command.name} has no {word}" for word in rest if word.startswith("-") and word not in known), None)

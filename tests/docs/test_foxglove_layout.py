@@ -8,7 +8,7 @@ import pytest
 from mcap.reader import make_reader
 
 from executive import run_mission
-from executive.record.schemas import schemas as log_schemas
+from executive.words.schemas import schemas as log_schemas
 from tests.docs.documents import DOCS
 
 LAYOUT = json.loads((DOCS / "how-to" / "foxglove-layout.json").read_text(encoding="utf-8"))

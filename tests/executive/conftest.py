@@ -46,6 +46,7 @@ from skills.relations import Relation
 from skills.robot import CommandState, CommandStatus, Lease
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot
+from tests.executive.house_tasks import MORE_TASKS, TASKS, tasks_installed
 from tests.tables import yaml_beside
 from tests.visitors import OnMessage, OnTick
 
@@ -450,3 +451,17 @@ def make():
         FETCH=FETCH, COKE=COKE, StandingRobot=StandingRobot, StillLocaliser=StillLocaliser,
         EmptyCostmap=EmptyCostmap, scripted_skill=scripted_skill, Script=Script, PORTS=PORTS,
     )  # fmt: skip
+
+
+@pytest.fixture
+def house_tasks():
+    """Installs the tasks of `house_tasks` beside the shipped ones."""
+    with tasks_installed(*TASKS) as found:
+        yield found
+
+
+@pytest.fixture
+def more_tasks():
+    """Installs three more tasks beside the shipped ones."""
+    with tasks_installed(*MORE_TASKS) as found:
+        yield found

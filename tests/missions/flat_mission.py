@@ -10,7 +10,6 @@ from executive.run.runner import run
 from executive.run.visitor import RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
-from executive.tree.registry import built_in_skills
 from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
@@ -18,6 +17,7 @@ from plant.engine import Pipeline
 from plant.robots.robot_kind import PlacedRobot
 from plant.simulation import Simulation
 from skills.faults.faulty_robot import inject_faults
+from tests.project import core_skills
 from tests.visitors import OnMessage, OnTick
 
 FETCH = (
@@ -29,14 +29,15 @@ FETCH = (
 class FlatMission:
     """A mission in the flat, with what happened in it."""
 
-    def __init__(self, texts, *, seed=1, start=None, **plant):
-        self.world = open_world("flat")
+    def __init__(self, texts, *, seed=1, start=None, world="flat", skills=(), visuals=False, **plant):
+        self.world = open_world(world)
         self.knowledge = knowledge_of(self.world)
         mission = Mission(name="m", robot="Alice", steps=tuple(Do.from_command(parse_command(text)) for text in texts))
-        self.tree = compile_mission(mission, knowledge=self.knowledge, registry=built_in_skills())
+        registry = core_skills() | {each.name: each for each in skills}
+        self.tree = compile_mission(mission, knowledge=self.knowledge, registry=registry)
         if start is not None:
             plant["robots"] = [PlacedRobot("Alice", "spot", start, self.world.dock)]
-        self.simulation = Simulation(self.world, seed=seed, visuals=False, **plant)
+        self.simulation = Simulation(self.world, seed=seed, visuals=visuals, **plant)
         self.clock = Pipeline(self.simulation.engine)
         robot, start = self.clock.robots["Alice"], self.simulation.starts["Alice"]
         self.entry = run_entry(robot, self.world, self.tree, start=start)

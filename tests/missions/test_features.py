@@ -14,6 +14,7 @@ from websockets.sync.client import connect
 
 from executive import run_mission
 from executive.app.prepare.from_request import prepare
+from executive.app.runs.backend import LiveLog
 from executive.app.runs.one_run import run_request
 from executive.cli.entry import app
 from executive.mission.request import Request
@@ -59,7 +60,7 @@ def test_a_varied_world_with_passers_by_and_random_faults_is_driven_through_and_
     options = ("--seed", 3, "--no-record", "--profile", "--out", tmp_path)
     report, printed = errand("run", "--say", "go to the kitchen", *varied, *options)
     assert judged(report) == FULFILLED
-    assert all(name in printed for name in ("joint control", "referee", "rendering")), printed
+    assert all(name in printed for name in ("plant.robots", "plant.referee", "skills.navigate")), printed
     events = read_events(tmp_path / "log.mcap")
     assert len(next(event.data["scenario"] for event in events if "scenario" in event.data)) == 3
 
@@ -202,7 +203,7 @@ def test_a_viewer_follows_a_mission_in_the_plant(tmp_path):
         connect(server.url, subprotocols=[PROTOCOL], max_size=None) as socket,
     ):
         view = OnTick(lambda progress: reading or reading.append(thread.submit(Client(socket).messages, 100)))
-        assert run_request(prepared, visitors=[view], live=server).report.achieved
+        assert run_request(prepared, visitors=[view, LiveLog(server)]).report.achieved
         topics = {topic for topic, *_ in reading[0].result(timeout=10.0)}
     assert topics >= {"map", "pose", "tree", "transitions"}, topics
 

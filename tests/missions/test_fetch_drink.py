@@ -3,7 +3,7 @@
 import pytest
 
 from executive.record.history import read_history
-from executive.record.schemas import WALL
+from executive.words.schemas import WALL
 from tests.missions.conftest import REPEATED_S
 from tests.tables import yaml_beside
 

@@ -15,7 +15,6 @@ from executive.run.runner import run
 from executive.run.visitor import RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
-from executive.tree.registry import built_in_skills
 from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
@@ -24,6 +23,7 @@ from plant import simulation
 from plant.worlds.seeding import place_objects
 from plant.worlds.world import load_world
 from tests.benchmarks.manipulation_room import TAKEN, room
+from tests.project import core_skills
 from tests.visitors import OnMessage
 
 pytestmark = [pytest.mark.mission, pytest.mark.nightly]
@@ -58,7 +58,7 @@ def test_the_beer_before_it_is_moved_aside_and_the_coke_is_taken(shelf):
     mission = Mission(name="shelf", world=str(shelf.folder), robot="Alice", steps=steps).with_policy(
         Policy(move_aside=1)
     )
-    tree = compile_mission(mission, knowledge=knowledge_of(shelf), registry=built_in_skills())
+    tree = compile_mission(mission, knowledge=knowledge_of(shelf), registry=core_skills())
     plant, said = simulation.Simulation(shelf, seed=SEED, visuals=False), list[str]()
     with LockStepWorker(plant.clock) as worker:
         result = run(

@@ -2,8 +2,8 @@
 
 import pytest
 
-from executive.record.schemas import SPEECH
 from executive.words.mission import Route
+from executive.words.schemas import SPEECH
 from skills.robot import Pose2D
 from tests.benchmarks.plant_mission import PlantMission
 from tests.visitors import OnMessage

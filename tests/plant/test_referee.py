@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from pydrake.geometry import Box, Cylinder
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlantConfig
 from pydrake.multibody.tree import SpatialInertia
@@ -455,6 +455,36 @@ def test_a_robot_that_moved_before_it_touched_a_person_caused_it(speed, hit):
     stage, velocity = Stage(), SpatialVelocity([0, 0, 0], [0, speed, 0])
     stage.plant.SetFreeBodySpatialVelocity(context=stage.context, body=stage.bodies["body"], V_JpJc=velocity)
     assert blame(stage.watch(0.3).put("body", (0, 3 - 0.2 - 0.049, 0.9)).watch()) == (hit, hit, 1 - hit)
+
+
+@pytest.fixture
+def truth_of(monkeypatch):
+    """Returns the truth by which a referee judges."""
+    monkeypatch.setattr("plant.referee.referee.judge", lambda conditions, truth, collisions: truth)
+    return lambda referee: referee.judge([])
+
+
+def hand_turned():
+    """A hand that moves at 0.5 s and turns at 1 s."""
+    stage = Stage().put("arm_wr1", (1.0, 2.0, 0.7)).watch()
+    X_WH = RigidTransform(RollPitchYaw(1.2, 0.0, 0.4), [1.0, 2.0, 0.7])
+    stage.plant.SetFloatingBaseBodyPoseInWorldFrame(stage.context, stage.bodies["arm_wr1"], X_WH)
+    return stage.watch(), X_WH
+
+
+def test_the_truth_has_the_pose_of_the_hand_at_any_time(truth_of):
+    stage, X_WH = hand_turned()
+    hand = truth_of(stage.referee).hands["alice"]
+    assert hand.pose_at(0.9).IsNearlyEqualTo(RigidTransform([1.0, 2.0, 0.7]), 1e-9)
+    assert hand.pose_at(1.1).IsNearlyEqualTo(X_WH, 1e-9)
+    assert len(hand.positions.points) == 3
+
+
+def test_poses_of_the_hand_outlive_a_restart(truth_of):
+    (stage, X_WH), other = hand_turned(), Stage()
+    paths = {name: np.array(stage.referee.points(name)) for name in stage.referee.names}
+    other.referee.resume(stage.referee.state(), paths)
+    assert truth_of(other.referee).hands["alice"].pose_at(1.1).IsNearlyEqualTo(X_WH, 1e-9)
 
 
 def test_contacts_with_people_outlive_a_restart():

@@ -1,9 +1,14 @@
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 
-from skills.grid_map import FilterMask, GridMap, load_grid_map
+from skills.grid_map import CELL_M, FilterMask, GridMap, load_grid_map, map_columns, wall_columns
 from skills.inputs.errors import InputError
+from skills.manipulation.arm.solid_cells import column_boxes
+from skills.world_model import Surface
 from tests.tables import table
 
 YAML = """image: room.pgm
@@ -260,3 +265,73 @@ def test_the_outlines_of_a_turned_mask_lie_about_its_cells():
     (outline,) = FilterMask(percent, 0.1, (2.0, 1.0, np.pi / 2)).outlines_W(100)
     low, high = outline.min(axis=0), outline.max(axis=0)
     assert np.allclose((low, high), [(2.0 - 0.95, 1.45), (2.0 - 0.55, 2.15)])
+
+
+BODY = RigidTransform([0.0, 0.0, 0.5])
+
+
+def inside(boxes, p_W):
+    p_B = BODY.inverse() @ np.array(p_W)
+    local = [box.X_FG.inverse() @ p_B for box in boxes]
+    return any(np.all(np.abs(p) <= np.array(box.size_m) / 2 + 1e-9) for p, box in zip(local, boxes, strict=True))
+
+
+def nothing_of(points):
+    return np.zeros(len(points), dtype=bool)
+
+
+def grid_of(*rectangles):
+    """A grid of 2 m x 2 m with occupied rectangles (x0, y0, x1, y1) in m."""
+    occupied = np.zeros((80, 80), dtype=bool)
+    for x0, y0, x1, y1 in rectangles:
+        occupied[round(y0 / 0.025) : round(y1 / 0.025), round(x0 / 0.025) : round(x1 / 0.025)] = True
+    return GridMap(occupied, 0.025, (0.0, 0.0))
+
+
+WALL, TABLE_EDGE, CHAIR_BACK, SOFA = (
+    (0.0, 0.0, 2.0, 0.1),
+    (0.2, 1.0, 1.2, 1.05),
+    (1.5, 1.0, 1.55, 1.4),
+    (1.4, 1.6, 2, 2),
+)
+DESK = Surface("desk", ((0.2, 1.0), (1.2, 1.0), (1.2, 1.6), (0.2, 1.6)), 0.75)
+
+
+def shows_wall(columns, *rectangle):
+    (x0, y0, x1, y1), middles = rectangle, (columns + 0.5) * CELL_M
+    return bool(np.any(np.all((middles > (x0 - 0.03, y0 - 0.03)) & (middles < (x1 + 0.03, y1 + 0.03)), axis=1)))
+
+
+def test_walls_are_what_all_grids_show():
+    high, low = grid_of(WALL, CHAIR_BACK), grid_of(WALL, SOFA)
+    columns = wall_columns([high, low], ())
+    assert shows_wall(columns, *WALL)
+    assert not shows_wall(columns, *CHAIR_BACK)
+    assert not shows_wall(columns, *SOFA)
+    assert shows_wall(wall_columns([high], ()), *CHAIR_BACK)  # a map without a second grid cannot tell
+
+
+def test_the_edges_of_surfaces_and_single_posts_are_no_walls():
+    columns = wall_columns([grid_of(WALL, TABLE_EDGE, (1.6, 0.6, 1.65, 0.65))], [DESK])
+    assert shows_wall(columns, *WALL)
+    assert not shows_wall(columns, *TABLE_EDGE)
+    assert not shows_wall(columns, 1.6, 0.6, 1.65, 0.65)
+    assert len(wall_columns([grid_of()], [DESK])) == 0
+
+
+def test_a_wall_is_solid_at_all_heights_of_the_arm_within_its_reach():
+    boxes = column_boxes(map_columns([grid_of(WALL)], ()), BODY, 1.0, lambda p_W: p_W[:, 0] < 0.4)
+    assert inside(boxes, (0.6, 0.05, 0.3))
+    assert inside(boxes, (0.6, 0.05, 1.8))
+    assert not inside(boxes, (0.2, 0.05, 1.0))
+    assert not inside(boxes, (1.5, 0.05, 1.0))
+
+
+def test_furniture_is_solid_from_just_below_its_lowest_surface_to_the_floor():
+    shelf = replace(DESK, height_m=1.2)
+    boxes = column_boxes(map_columns([grid_of(WALL)], [shelf, DESK]), BODY, 2.0, nothing_of)
+    assert inside(boxes, (0.7, 1.3, 0.1))
+    assert inside(boxes, (0.7, 1.3, DESK.height_m - 0.05))
+    assert not inside(boxes, (0.7, 1.3, DESK.height_m - 0.005))
+    assert not inside(boxes, (0.7, 1.3, 1.1))
+    assert not inside(boxes, (1.4, 1.3, 0.5))

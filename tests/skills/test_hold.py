@@ -64,7 +64,12 @@ def test_after_it_was_gripped_again_the_next_slip_counts_from_how_it_is_held_the
 def test_fingers_that_stay_apart_have_a_moment_to_feel_it_again():
     weak, unfelt = (0.5, 1.0, True), (0.5, 1.0, False)
     assert judged(HELD, weak, weak, unfelt, unfelt, HELD)[2:] == [Grip.SLIPPING, Grip.HELD, Grip.HELD, Grip.HELD]
-    assert judged(HELD, weak, weak, *[unfelt] * 4)[3:] == [Grip.HELD, Grip.HELD, Grip.HELD, Grip.LOST]
+    assert judged(HELD, weak, weak, *[unfelt] * 10)[3:] == [*[Grip.HELD] * 9, Grip.LOST]
+
+
+def test_fingers_that_close_about_a_turning_object_may_feel_it_again_until_they_are_shut():
+    weak, narrow, shut = (0.5, 1.0, True), (0.1, 1.0, False), (0.02, 1.0, False)
+    assert judged(HELD, weak, weak, narrow, narrow, shut)[3:] == [Grip.HELD, Grip.HELD, Grip.LOST]
 
 
 def test_fingers_that_close_after_it_was_gripped_again_have_lost_it():

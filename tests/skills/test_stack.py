@@ -7,7 +7,6 @@ import pytest
 from planar_robot import Bench
 
 from executive.tree.port_values import conforms, field_types
-from executive.tree.registry import built_in_skills
 from skills.navigate.skill import Navigate
 from skills.quantities import base_type, bounds
 from skills.robot import Pose2D
@@ -22,6 +21,7 @@ from skills.stack import (
     stack_of,
     stack_schema,
 )
+from tests.project import project_skills
 from tests.tables import table
 
 
@@ -76,7 +76,7 @@ def numbers(record, where):
 
 
 OPTIONS = {**skill_options(), **{name: kind for slot in SLOTS for name, kind in components(slot).items()}}
-INPUTS = {f"{name}.Inputs": skill.Inputs for name, skill in built_in_skills().items()}
+INPUTS = {f"{name}.Inputs": skill.Inputs for name, skill in project_skills().items()}
 
 
 @pytest.mark.parametrize("record", [*OPTIONS.values(), *INPUTS.values()], ids=[*OPTIONS, *INPUTS])

@@ -2,25 +2,23 @@
 
 import functools
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from wheeled_toy import TOY
 
 from executive.testing.skill_suite import PARTS, SuiteCase
 from executive.testing.skill_test import bench_of_setup, carry_out, load_skill_tests, scripted_maker
-from executive.tree.registry import built_in_skills
 from skills.faults.fault_kinds import STANDARD_FAULTS
 from skills.robot import BaseKind
+from tests.project import project_skills, skill_tests
 
-SKILLS = built_in_skills()
+SKILLS = project_skills()
 DRIVING = ("navigate", "approach", "back_off", "place", "hand_over", "relocalise", "find_people")
 
 
 def well(name):
     """The tests of a skill in which all goes well, with their indices."""
-    (path,) = Path(__file__).parent.rglob(f"{name}.skilltest.yaml")
-    file = load_skill_tests(path, SKILLS, [*STANDARD_FAULTS])
+    file = load_skill_tests(skill_tests(name), SKILLS, [*STANDARD_FAULTS])
     return file, [n for n, test in enumerate(file.tests) if test.expect.outcome == "success" and not test.faults]
 
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from planar_robot import OUTLINE, TWO_ROOMS, Bench, grid_of
 
-from skills.api import Cause, Failed, NoWorkCounter, Succeeded
+from skills.api import Cause, Failed, Succeeded
 from skills.estimate.costmap import LayeredCostmap
 from skills.footprint import Footprint, disc_centres, footprint_clearance_m, pose_array
 from skills.navigate.planner import LatticePlanner, NoPathError
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
-from skills.world_model import FilterType, Zone, ZoneKind, ZoneMask, zones_sentence
+from skills.world_model import FilterType, NoWorkCounter, Zone, ZoneKind, ZoneMask, zones_sentence
 from skills.zone_map import KeepOut, zone_map
 
 FOOTPRINT = Footprint.rectangle(OUTLINE)

@@ -9,14 +9,14 @@ from itertools import combinations
 
 import numpy as np
 
-from executive.run.resting import SteppingAside
 from executive.run.traffic_table import TrafficTable
 from executive.run.worker import LockStepWorker
-from skills.api import Failed, SkillContext, Step, Succeeded
+from skills.api import Failed, Running, SkillContext, Step, Succeeded
 from skills.footprint import Footprint, disc_centres, pose_array
 from skills.grid_map import GridMap
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import BaseKind, Pose2D
+from skills.small.back_off import StepAside, StepAsideInputs
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import BASE_ONLY, ScriptedRobot, Start
@@ -50,7 +50,8 @@ class Trip:
     skill: Navigate | None = None
     attempts: int = 0
     ended: Step | None = None
-    aside: SteppingAside | None = None
+    aside: StepAside | None = None
+    aside_due_s: float = 0.0
     last: Step | None = None
 
     def step(self, table):
@@ -58,8 +59,7 @@ class Trip:
         rests = self.ended is not None or self.context.clock.now() < self.after_s
         table.rest(self.context.robot.name, idle=rests)
         if rests:
-            self.aside = self.aside or SteppingAside(self.context)
-            self.aside.step()
+            self.step_aside()
             return
         if self.aside is not None:
             self.aside.end()
@@ -73,6 +73,16 @@ class Trip:
             self.skill = None
             if isinstance(step, Succeeded) or self.attempts >= ATTEMPTS:
                 self.ended = step
+
+    def step_aside(self):
+        """One tick without a trip: looks twice a second whether somebody needs the space."""
+        now_s = self.context.clock.now()
+        if self.aside is None and now_s >= self.aside_due_s:
+            self.aside = StepAside(self.context)
+            self.aside.begin(StepAsideInputs())
+        if self.aside is not None and not isinstance(self.aside.step(), Running):
+            self.aside.end()
+            self.aside, self.aside_due_s = None, now_s + 0.5
 
 
 @dataclass

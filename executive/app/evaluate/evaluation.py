@@ -27,10 +27,10 @@ from executive.app.report.run_report import RunReport
 from executive.app.runs.one_run import return_memory, run_request
 from executive.mission.request import Request
 from executive.record.history import Event, read_events, timeline
-from executive.record.schemas import TRANSITIONS, TREE
 from executive.tree.node_view import logged_view
 from executive.view.map_picture import map_picture
 from executive.words.goal import RefereeReport
+from executive.words.schemas import TRANSITIONS, TREE
 from executive.words.variation import NO_VARIATION
 from skills.inputs.errors import InputError, Problems
 

@@ -12,7 +12,6 @@ from pydantic import Field, model_validator
 
 from executive.app.evaluate.results import Evaluation, RunSpec
 from executive.app.prepare.mission_files import mission_file
-from executive.mission.load import stack_file
 from executive.mission.request import Request
 from executive.mission.scenario import NO_SCENARIO, RandomFaults, Scenario
 from executive.words.robot_config import NamedRobot, RobotConfig, robots_of_file
@@ -24,6 +23,7 @@ from skills.inputs.outside import is_file, read_text
 from skills.inputs.schema import Name, Strict, Text, validate
 from skills.inputs.yaml_source import KeyPath, YamlSource, read_yaml
 from skills.quantities import LongDuration, Seed
+from skills.stack import stack_file
 
 MOST_RUNS: Final = 200_000
 CONDITION: Final = "condition"

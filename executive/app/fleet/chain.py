@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from executive.app.fleet.auction import Bid
 from executive.app.fleet.fleet_mission import FleetMission, is_plain, with_commands
 from executive.app.prepare.prepared import Prepared
-from executive.words.command import Command, Task
+from executive.words.command import Command
 from executive.words.knowledge import SurfaceFacts
+from executive.words.task import basic
 from skills.inputs.errors import InputError
 
 
@@ -47,11 +48,11 @@ def splits(commands: Sequence[Command], tables: Iterable[str]) -> Iterator[Split
         before, after = own[number - 1], own[number]
         if after.item is None:
             yield Split(own[:number], own[number:])
-        elif before.task is Task.GRASP and before.object == after.item:
+        elif before.takes and before.object == after.item:
             item, count = after.item, after.item_count
             for table in tables:
                 put = Command(item=item, goal=table, item_count=count)
-                take = Command(goal=table, task=Task.GRASP, object=item, object_count=count)
+                take = Command(goal=table, task=basic().take, object=item, object_count=count)
                 yield Split((*own[:number], put), (take, *own[number:]), table)
 
 

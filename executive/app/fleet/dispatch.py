@@ -33,13 +33,13 @@ from executive.mission.request import TIME_LIMIT_S, Request
 from executive.mission.scenario import Scenario
 from executive.record.announce import announce
 from executive.record.event_log import EventLog
-from executive.record.schemas import MISSIONS
 from executive.run.outcome import Outcome, RobotResult, RobotStatus
 from executive.run.visitor import Assigner, MissionEnd, Progress, RunEntry
 from executive.store.missions import GivenMissions, MissionState, MissionStore
 from executive.tree.board import Sign
 from executive.tree.node_view import node_view
 from executive.words.knowledge import BatteryFacts
+from executive.words.schemas import MISSIONS
 from skills.inputs.errors import InputError, listing
 
 LEFT_M: Final = 1.5

@@ -26,17 +26,17 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import RoutePlanner, load_estimates
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.guard import KnowsPlace
-from executive.words.command import Command, Task
+from executive.words.command import Command
 from executive.words.knowledge import BatteryFacts, Knowledge, SurfaceFacts
 from executive.words.leaf_steps import Do, Say, steps_of_commands
 from executive.words.mission import Mission
 from executive.words.step import Step
+from executive.words.task import basic
 from plant.robots.robot_kind import PlacedRobot, robot_kind
 from plant.worlds.world import World
-from skills.api import Surface, Zone
-from skills.geometry import wrap
+from skills.api import Zone
+from skills.geometry import surface_spots, wrap
 from skills.inputs.errors import InputError
-from skills.manipulation.place.free_spots import spots
 from skills.robot import Pose2D
 
 URGENT: Final = 0.5
@@ -149,7 +149,7 @@ def _patient(knowledge: Knowledge) -> Knowledge:
 
 def charging_missions(world: World, knowledge: Knowledge, robots: Mapping[str, PlacedRobot]) -> Mapping[str, Prepared]:
     """Prepares a charging mission for each robot that has a dock."""
-    charge = Command(task=Task.CHARGE)
+    charge = Command(task=basic().charge)
     setting = Setting(Request(commands=(str(charge),), world_name=world.name), world, _patient(knowledge), robots)
     steps = steps_of_commands([charge])
     return {
@@ -199,7 +199,7 @@ def _out_of_reach(prepared: Prepared, pose: Pose2D, planner: RoutePlanner) -> It
     """
     knowledge = prepared.knowledge
     for command in prepared.tree.commands:
-        if command.task is not Task.GRASP or command.object is None:
+        if not command.takes or command.object is None:
             continue
         place = None if command.goal is None else knowledge.place(command.goal)
         usual = knowledge.usual_surfaces(command.object.name) if place is None else (place,)
@@ -404,8 +404,7 @@ class Offers:
         view, planner = table.viewpoints[0], robot.planner
         if arm is None or planner is None:
             return False
-        there = spots(Surface("table", table.polygon, table.height))
-        x, y = min(there, key=lambda spot: float(np.hypot(*(spot - [view.x, view.y]))))
+        x, y = min(surface_spots(table.polygon), key=lambda spot: float(np.hypot(*(spot - [view.x, view.y]))))
         yaws = [wrap(2.0 * math.pi * n / _HEADINGS) for n in range(_HEADINGS)]
         return any(
             is_reachable(planner, robot.pose, Pose2D(x - d_m * math.cos(yaw), y - d_m * math.sin(yaw), yaw))

@@ -36,8 +36,8 @@ from executive.app.report.report_page import (
     save_report,
 )
 from executive.app.report.run_report import VERDICTS, Verdict, title_of
+from executive.app.runs.backend import Display, OpenRun
 from executive.app.runs.one_run import log_map
-from executive.app.runs.page_view import PageView
 from executive.app.runs.signals import ended_by_signals
 from executive.app.runs.simulated import SimulatedBackend, compile_first
 from executive.mission.request import Request
@@ -45,10 +45,9 @@ from executive.record.event_log import EventLog
 from executive.record.history import Event, read_events
 from executive.run.control import Control
 from executive.run.runner import run
-from executive.run.visitor import RunSettings
+from executive.run.visitor import RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
 from executive.store.missions import GivenMissions, MissionState, MissionStore, StoredMission
-from executive.view.foxglove import LiveServer
 from executive.words.robot_config import RobotConfig
 from plant.worlds.world import World
 from skills.inputs.errors import InputError, Problems
@@ -64,15 +63,16 @@ def run_fleet(
     out: Path,
     seed: int,
     time_limit_s: float | None = None,
-    page: PageView | None = None,
-    live: LiveServer | None = None,
+    visitors: Sequence[RunVisitor] = (),
+    control: Control | None = None,
     first: Prepared | None = None,
     ended: Callable[..., None] = lambda **_: None,
 ) -> Verdict:
     """Runs until no mission can be assigned; writes log, recording and report into the folder `out`.
 
-    `page` shows the run, `live` sends the log's messages, and `ended` is called with the `total` of missions whenever
-    one ends. The log begins with the map of the `first` mission. Raises InputError for an unusable page or log.
+    `visitors` watch the run, a `Display` also before and after it, `control` pauses and cancels it, and `ended` is
+    called with the `total` of missions whenever one ends. The log begins with the map of the `first` mission. Raises
+    InputError for an unusable display or log.
     """
     backend, artifacts, begun_s = dispatch.backend, Artifacts(), dispatch.backend.clock.now()
     dispatch.ended, dispatch.extended = ended, time_limit_s is None
@@ -80,19 +80,18 @@ def run_fleet(
     limit_s = sum(limits_s) if time_limit_s is None else time_limit_s
     with closing(EventLog(out / "log.mcap", backend.clock, apart=True)) as log:
         dispatch.log = log
-        if page is not None:
-            page.serve(log, backend.show_live())
-        if live is not None:
-            live.follow(log)
+        displays = [each for each in visitors if isinstance(each, Display)]
+        for display in displays:
+            display.opened(OpenRun(log, backend))
         if first is not None:
             log_map(log, first.world, first.knowledge)
-        control = Control(pace=None) if page is None else page.control
+        control = control or Control(pace=None)
         with ended_by_signals(dispatch.stop), ended_by_signals(control.cancel), LockStepWorker(backend.clock) as worker:
             result = run(
                 dispatch,
                 clock=backend.clock,
                 worker=worker,
-                visitors=(artifacts, log, *([] if page is None else [page]), *backend.visitors(control, log)),
+                visitors=(artifacts, log, *visitors, *backend.visitors(control, log)),
                 settings=RunSettings(seed=seed, time_limit_s=limit_s),
                 control=control,
                 spare=dispatch.spare(),
@@ -104,8 +103,8 @@ def run_fleet(
     verdict = _write_report(
         dispatch, out, artifacts, read_events(log.path), (*facts, ("duration", lasted), *facts_now())
     )
-    if page is not None:
-        page.offer(recording, out / REPORT, [verdict])
+    for display in displays:
+        display.reported(recording, out / REPORT, (verdict,))
     return verdict
 
 

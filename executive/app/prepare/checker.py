@@ -10,8 +10,9 @@ from typing import Final
 
 from executive.app.prepare.feasibility import check_prepared, route_planner_of
 from executive.app.prepare.from_request import prepare
+from executive.app.prepare.placed_robots import robot_stack, shared_detector
 from executive.app.prepare.prepared import Prepared
-from executive.app.prepare.worlds import crossing_rooms, refuse_unusable
+from executive.app.prepare.worlds import crossing_rooms, refuse_unusable, unsayable_names
 from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Estimate, RoutePlanner, minutes_text
@@ -28,7 +29,7 @@ _SHOWN: Final = 2
 class Checked:
     """Result of a check: errors and warnings, the tree of each robot, and one estimate for all robots together.
 
-    `file` is the mission file; None for a mission without a file.
+    `file` is the mission file; None for a mission without a file. `detectors` says how own detectors are read.
     """
 
     file: Path | None
@@ -37,6 +38,7 @@ class Checked:
     estimate: Estimate = field(default_factory=Estimate)
     warnings: tuple[InputError, ...] = ()
     time_limit_s: float = math.inf
+    detectors: tuple[str, ...] = ()
 
     @property
     def ok(self) -> bool:
@@ -78,6 +80,7 @@ class Checker:
 
     def __init__(self) -> None:
         self._routes: dict[tuple[Path, str, Path | None], RoutePlanner] = {}
+        self._unsayable: dict[Path, tuple[InputError, ...]] = {}
 
     def check(self, request: Request) -> Checked:
         """Checks a request; reports defects of the mission as errors in the result instead of raising them."""
@@ -85,7 +88,9 @@ class Checker:
         try:
             prepared = prepare(request)
             trees = tuple(each.tree for each in prepared.all)
-            refuse_unusable(prepared.world)
+            refuse_unusable(prepared.world, prepared.request.seed)
+            stacks = [robot_stack(each.robot) for each in prepared.all if each.robot.stack_file is not None]
+            detectors = tuple(filter(None, dict.fromkeys(shared_detector(stack).about for stack in stacks)))
             checked = {each.mission.robot_name: check_prepared(each, self._planner(each)) for each in prepared.all}
         except InputError as error:
             return Checked(file, _placed(file, (error, *error.others)), trees)
@@ -96,7 +101,11 @@ class Checker:
         warnings = tuple(warning for each in checked.values() for warning in each.warnings)
         estimates = {name: each.estimate for name, each in checked.items()}
         warnings += crossing_rooms(prepared.world, prepared.knowledge)
-        return Checked(file, _placed(file, errors), trees, _total(prepared, estimates), warnings, prepared.time_limit_s)
+        if prepared.world.folder not in self._unsayable:
+            self._unsayable[prepared.world.folder] = unsayable_names(prepared.world, prepared.knowledge)
+        warnings += self._unsayable[prepared.world.folder]
+        total, limit_s = _total(prepared, estimates), prepared.time_limit_s
+        return Checked(file, _placed(file, errors), trees, total, warnings, limit_s, detectors)
 
     def _planner(self, prepared: Prepared) -> RoutePlanner:
         world, robot = prepared.world, prepared.robot

@@ -14,15 +14,16 @@ from executive.app.prepare.placed_robots import DEFAULT_KIND, reported_classes, 
 from executive.app.prepare.prepared import Prepared
 from executive.app.prepare.worlds import refuse_unusable
 from executive.tree.check import Abilities, Checked, PlannedRoutes, check_tree
+from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Route, RoutePlanner, load_estimates
 from plant.robots.robot_kind import PlacedRobot, robot_kind
 from plant.worlds.world import World
 from skills.api import Zone
 from skills.class_forms import class_forms, known_attributes, shipped_forms
 from skills.inputs.errors import Problems
-from skills.manipulation.arm.kinematics import arm_model
-from skills.robot import Capabilities, Mount, Pose2D
-from skills.stack import DEFAULT_FILE, ControllerComponent, default_component
+from skills.path import ControllerComponent
+from skills.robot import Capabilities, Pose2D
+from skills.stack import DEFAULT_FILE, default_component
 
 
 class _RoutesOnMap(RoutePlanner):
@@ -81,6 +82,7 @@ def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> C
     """
     world, robot = prepared.world, prepared.robot
     abilities = abilities_in(world, robot.kind)
+    abilities = replace(abilities, reaches_m=reached_heights_m(prepared.tree, robot.capabilities))
     tagged = frozenset(tag.on for tag in prepared.tree.tags if tag.on is not None)
     if reported := reported_classes(robot):
         words = {*class_forms(), *prepared.knowledge.categories()}
@@ -97,7 +99,7 @@ def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> C
 
 def refuse_impossible(prepared: Prepared) -> None:
     """Raises InputError with all errors that `errand check` finds."""
-    refuse_unusable(prepared.world)
+    refuse_unusable(prepared.world, prepared.request.seed)
     problems = Problems()
     for error in (error for each in prepared.all for error in check_prepared(each).errors):
         problems.add(error)
@@ -134,44 +136,28 @@ def abilities_in(world: World, kind: str = DEFAULT_KIND) -> Abilities:
 
 @cache
 def abilities_of(kind: str) -> Abilities:
-    """Returns payload, reach and gripper of a kind of robot, and the least mass and width of each object class."""
+    """Returns payload and gripper of a kind of robot, and the least mass and width of each object class."""
     masses = {name: 0.0 if form.mass_kg is None else form.mass_kg[0] for name, form in class_forms().items()}
     capabilities = robot_kind(kind).capabilities()
-    above_m = capabilities.standing_height_m
     return Abilities(
         masses,
         0.0 if capabilities.arm is None else capabilities.arm.max_payload_kg,
         frozenset(shipped_forms()),
         known_attributes(),
-        reached_heights_m(capabilities),
-        {name: form.width_m[0] for name, form in class_forms().items()},
-        math.inf if capabilities.gripper is None else capabilities.gripper.max_grasp_m,
-        capabilities.gripper is not None and capabilities.arm is not None,
-        capabilities.arm is not None,
-        capabilities.object_camera is not None,
-        cameras={
-            each.source: above_m + float(each.X_FC.translation()[2]) if each.mount is Mount.BODY else math.inf
-            for each in capabilities.cameras
-        },
+        widths_m={name: form.width_m[0] for name, form in class_forms().items()},
+        opens_m=math.inf if capabilities.gripper is None else capabilities.gripper.max_grasp_m,
+        gripper=capabilities.gripper is not None and capabilities.arm is not None,
+        arm=capabilities.arm is not None,
+        looks=capabilities.object_camera is not None,
+        capabilities=capabilities,
     )
 
 
-def reached_heights_m(capabilities: Capabilities) -> tuple[float, float]:
-    """Heights of the lowest and the highest surface that the arm reaches, in metres above the floor.
-
-    They depend on the arm's length, the range of body heights, and the nearest standing distance. They are infinite if
-    the robot has no arm that can be planned for.
-    """
-    try:
-        model, arm = arm_model(capabilities), capabilities.arm
-    except ValueError:
-        return -math.inf, math.inf
-    assert arm is not None
-    x_m, _, z_m = model.p_BS
-    ahead_m = max(0.0, min(*arm.standing_m, *arm.nearer_m) - float(x_m))
-    upright_m = math.sqrt(max(0.0, arm.max_reach_m**2 - ahead_m**2))
-    low_m, high_m = capabilities.height_range_m
-    return low_m + float(z_m) - upright_m, high_m + float(z_m) + upright_m
+def reached_heights_m(tree: CompiledTree, capabilities: Capabilities) -> tuple[float, float]:
+    """Heights (m) of the lowest and the highest surface at which all skills of a tree work."""
+    skills = {node.skill for node in tree.root.walk() if node.skill is not None}
+    limits_m = [each.reached_heights_m(capabilities) for each in skills]
+    return max((low_m for low_m, _ in limits_m), default=-math.inf), min((m for _, m in limits_m), default=math.inf)
 
 
 _SKILLS: Final = DEFAULT_FILE.parent
@@ -186,7 +172,7 @@ class RouteCache(RoutePlanner):
     @cached_property
     def _routes(self) -> dict[str, list[float] | str]:
         """Length and progress of each route by start and goal, or the reason why there is no route."""
-        with suppress(OSError, ValueError):
+        with suppress(OSError, ValueError, RecursionError):
             routes: dict[str, list[float] | str] = json.loads(self._file.read_text(encoding="utf-8"))
             return routes
         return {}

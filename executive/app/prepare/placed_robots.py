@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
+from functools import cache, partial
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -17,13 +18,16 @@ from executive.words.knowledge import DOCK, Knowledge, Pose, RobotFacts
 from executive.words.robot_config import RobotConfig
 from plant.robots.robot_kind import PlacedRobot, robot_kind
 from plant.worlds.world import World
+from skills.detection import DetectorComponent, with_defaults
 from skills.footprint import Footprint
 from skills.inputs.errors import InputError
+from skills.inputs.plugins import RECOGNISERS, PluginDefect, distribution_of, installed_plugins, run_plugin
 from skills.robot import FloatArray, Pose2D
-from skills.stack import DetectorComponent, RobotStack, default_component, default_stack
+from skills.stack import RobotStack, default_component, default_stack
 
 if TYPE_CHECKING:
-    from skills.detection import Detector
+    from skills.detection import Detector, Recogniser
+    from skills.world_model import Tag
 
 
 DEFAULT_KIND: Final = "spot"
@@ -188,17 +192,29 @@ def stand_at(world: World, start: Start, seed: int) -> Pose2D:
 
 @cache
 def _built(component: DetectorComponent) -> Detector:
-    return component.build()
+    return with_defaults(component.build())
 
 
-def shared_detector(stack: RobotStack | None = None, world: World | None = None) -> Detector:
-    """Returns the detector of a stack (None: the default one), extended by the models of the world's own objects.
+def shared_detector(stack: RobotStack | None = None, world: World | None = None, tags: Sequence[Tag] = ()) -> Detector:
+    """Returns the detector of a stack (None: the default one), extended by the world's own objects and its tags.
 
-    Loads the networks once in a process. Raises InputError if a model cannot be read.
+    Loads the networks once in a process. Raises InputError if a model or a recogniser cannot be used.
     """
-    networks = _built((stack or default_stack()).detector)
-    if world is None or not world.own_objects:
-        return networks
-    from skills.perception.model_matching import with_models
+    detector = _built((stack or default_stack()).detector)
+    folders = () if world is None else tuple(each.folder for each in world.own_objects.values())
+    for entry in sorted(installed_plugins(RECOGNISERS), key=lambda entry: entry.name) if folders or tags else ():
+        try:
+            recogniser: Recogniser = run_plugin(entry, entry.load)
+            detector = run_plugin(entry, partial(recogniser, detector, folders, tags))
+        except PluginDefect as defect:
+            if isinstance(defect.__cause__, InputError):
+                raise defect.__cause__ from defect
+            raise _cannot_recognise(entry, str(defect)) from defect
+        if not callable(getattr(detector, "detect", None)):
+            raise _cannot_recognise(entry, "it returns no detector")
+    return detector
 
-    return with_models(networks, (each.folder for each in world.own_objects.values()))
+
+def _cannot_recognise(entry: EntryPoint, why: str) -> InputError:
+    what = f"cannot use recogniser '{entry.name}' ({entry.value}) of {distribution_of(entry)}: {why}"
+    return InputError(what, hint="repair or uninstall that distribution")

@@ -15,11 +15,11 @@ import cv2
 import numpy as np
 
 from executive.record.history import Event
-from executive.record.schemas import ACTIVITY, DESTINATION, TRANSITIONS, TREE
 from executive.run.visitor import RunVisitor
 from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.view.map_picture import newest_zones
 from executive.view.text import ROBOT_COLOURS, rgb_of
+from executive.words.schemas import ACTIVITY, DESTINATION, TRANSITIONS, TREE
 from executive.words.slug import slug
 from plant.scene_pictures import PATH_COLOUR, best_view, draw_detection, draw_map, render_view, save_png, top_view
 from plant.simulation import Simulation

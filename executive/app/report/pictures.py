@@ -7,14 +7,11 @@ from typing import Final
 import cv2
 import numpy as np
 
-from skills.detection import Detection, Detector
+from skills.detection import Detection, Detector, PictureDetectorComponent, with_defaults
 from skills.inputs.errors import InputError
 from skills.inputs.picture_files import read_pixels
-from skills.perception.detector import Cascade
-from skills.perception.detector.exported import ExportedNetwork, load_exported
-from skills.perception.detector.model_files import MODEL_FILE, is_cascade
-from skills.perception.detector.onnx_detector import DetectorOptions, load_detector
 from skills.robot import Picture
+from skills.stack import components, default_component
 
 Colour = tuple[int, int, int]
 
@@ -24,17 +21,17 @@ _LINE_PER_PX: Final = 1 / 320
 
 def open_detector(file: Path | None, threshold: float) -> Detector:
     """Loads the detector of an ONNX or stack file, or the shipped one. Raises InputError if it cannot be used."""
-    if file is not None and file.suffix in (".yaml", ".yml"):
+    if file is None:
+        component = default_component("detector")
+    elif file.suffix in (".yaml", ".yml"):
         from executive.mission.load import load_stack  # loads Drake
 
         component = load_stack(file).detector
     else:
-        component = Cascade(file) if file is None or is_cascade(file) else ExportedNetwork(file)
-    if isinstance(component, ExportedNetwork):
-        return load_exported(component, threshold, every=True)
-    if isinstance(component, Cascade):
-        return load_detector(component.file or MODEL_FILE, DetectorOptions(threshold=threshold))
-    return component.build()
+        component = components("detector")["onnx"](file)
+    if isinstance(component, PictureDetectorComponent):
+        return component.build_for_pictures(threshold)
+    return with_defaults(component.build())
 
 
 def draw_detections(picture: Picture, found: Sequence[Detection]) -> Picture:

@@ -29,7 +29,6 @@ from executive.app.report.run_report import (
 from executive.mission.request_fields import command_of
 from executive.record.announce import PACKAGES, versions
 from executive.record.history import RECORDING, Event, seen_objects
-from executive.record.schemas import TRANSITIONS
 from executive.run.outcome import Finding, RunResult, Said
 from executive.tree.compiler import CompiledTree
 from executive.tree.node_view import NodeView
@@ -41,6 +40,7 @@ from executive.view.plots import curves_of, to_plot
 from executive.view.text import DRAWN_NODES, ROBOT_COLOURS, NodeStyle, Styles, executed_tree, readable, style_of
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import inside
+from executive.words.schemas import TRANSITIONS
 from skills.api import ObjectObservation
 from skills.inputs.errors import InputError
 

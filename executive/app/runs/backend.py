@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import logging
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, Protocol
 
 from executive.app.report.artifacts import Artifacts
-from executive.record.work import Profile
 from executive.run.control import Control
 from executive.run.outcome import RobotResult
 from executive.run.visitor import RunEntry, RunVisitor
@@ -16,29 +17,94 @@ from executive.store.journal import StoreJournal
 from executive.tree.compiler import CompiledTree
 from executive.words.goal import RefereeReport
 from skills.api import Publish
-from skills.inputs.errors import InputError
-from skills.inputs.plugins import PluginDefect, installed_plugins, run_plugin
+from skills.inputs.errors import InputError, suggestion
+from skills.inputs.plugins import OBSERVERS, PluginDefect, installed_plugins, run_plugin
 from skills.robot import Clock, Pose2D
 
 if TYPE_CHECKING:
     from executive.app.prepare.prepared import Prepared
+    from executive.app.report.run_report import Verdict
     from executive.app.runs.goal_conditions import Share
+    from executive.record.event_log import EventLog
+    from executive.view.foxglove import LiveServer  # imports asyncio
     from executive.view.server import Scene
 
-OBSERVERS: Final = "errand.observers"  # of `--observe NAME[=VALUE]`: functions from VALUE to an `Observe`
+_LOG: Final = logging.getLogger(__name__)
 Observe = Callable[["Prepared", Control], RunVisitor]
 """Function that returns the visitor for one run, which may use the run's control."""
 
 
 def observer(text: str) -> Observe:
-    """Loads an observer by NAME[=VALUE]. Raises InputError unless one plug-in registers it and takes the value."""
+    """Loads an observer by NAME[=VALUE]. Raises InputError unless one distribution registers it and takes the value."""
     name, _, value = text.partition("=")
+    installed = installed_plugins(OBSERVERS)
+    if name not in installed.names:
+        raise InputError(f"there is no observer '{name[:60]}'", hint=suggestion(name, installed.names))
     try:
-        (entry,) = (each for each in installed_plugins(OBSERVERS) if each.name == name)
+        (entry,) = installed.select(name=name)
         made: Callable[[str], Observe] = run_plugin(entry, entry.load)
     except (ValueError, PluginDefect) as error:
         raise InputError(f"cannot observe by '{name[:60]}'", hint="errand plugins says why") from error
     return made(value)
+
+
+@dataclass(frozen=True)
+class OpenRun:
+    """Run before its beginning: its open log and its backend."""
+
+    log: EventLog
+    backend: Backend
+
+
+class Display(RunVisitor):
+    """Visitor that also sees the run before its beginning and after its report. By default each method does nothing."""
+
+    def opened(self, run: OpenRun) -> None:
+        """Handles the open log, before its first message. Raises InputError if the run cannot be displayed."""
+
+    def reported(self, recording: Path | None, report: Path, verdicts: Sequence[Verdict]) -> None:
+        """Handles the recording, the written report, and the verdicts on the ended run."""
+
+
+@dataclass
+class LiveLog(Display):
+    """Sends the messages of each run's log to a server."""
+
+    server: LiveServer
+
+    def opened(self, run: OpenRun) -> None:
+        """Sends the log's messages from now on."""
+        self.server.follow(run.log)
+
+
+class FoxgloveObserver(AbstractContextManager["FoxgloveObserver"]):
+    """Observer that serves what runs log, live for Foxglove."""
+
+    def __init__(self, address: str) -> None:
+        """Serves at HOST:PORT, by default at the usual one, and names the address. Raises InputError."""
+        from executive.view.foxglove import USUAL_ADDRESS, LiveServer
+
+        self._server = LiveServer(address or USUAL_ADDRESS)
+        _LOG.warning("Foxglove: %s", self._server.url)
+
+    def __call__(self, prepared: Prepared, control: Control) -> RunVisitor:
+        """Returns the visitor for a run."""
+        return LiveLog(self._server)
+
+    def __exit__(self, *error: object) -> None:
+        self._server.close()
+
+
+@contextmanager
+def observers(texts: Sequence[str] | None) -> Iterator[Sequence[Observe]]:
+    """Loads observers by NAME[=VALUE], and closes them after the block. Raises InputError like `observer`."""
+    with ExitStack() as stack:
+        made = list[Observe]()
+        for text in texts or ():
+            made.append(observer(text))
+            if isinstance(made[-1], AbstractContextManager):
+                stack.enter_context(made[-1])
+        yield made
 
 
 @dataclass(frozen=True)
@@ -94,10 +160,6 @@ class Backend(Protocol):
     def work(self) -> Mapping[str, int]:
         """Returns the backend's work counters by name; empty for a real robot."""
         return {}
-
-    def attach(self, profile: Profile) -> None:
-        """Lets the profile time the backend's subsystems."""
-        return None
 
     def show_live(self) -> Scene | None:
         """Starts the live picture; None if there is none."""

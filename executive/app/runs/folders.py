@@ -5,9 +5,10 @@ The file `run.json` of a folder says what was asked, when, and by which version;
 
 from __future__ import annotations
 
+import fcntl
 import shutil
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from importlib.metadata import version
@@ -37,13 +38,20 @@ class KeptRun:
     version: str
     report: Mapping[str, Any] | None = None
 
+    @contextmanager
+    def going_on(self) -> Iterator[None]:
+        """Locks the folder against `remove_runs` during the block, or until the process dies."""
+        with (self.request.out / FACTS).open() as file:
+            fcntl.flock(file, fcntl.LOCK_SH)
+            yield
+
     def end(self, report: Mapping[str, Any]) -> None:
         """Writes the report."""
         _write(replace(self, report=report))
 
     def undo(self) -> None:
         """Removes the folder of a run that could not begin; files of the run stay."""
-        if {path.name for path in self.request.out.iterdir()} == {FACTS}:
+        if [path.name for path in self.request.out.glob("*")] == [FACTS]:
             _remove(self.request.out.parent, [self.request.out])
 
 
@@ -95,11 +103,22 @@ def kept_runs(out: Path) -> list[KeptRun]:
     return sorted(found, key=lambda kept: (kept.begun, kept.request.out.name))
 
 
-def remove_runs(out: Path, older_than: timedelta, now: datetime) -> list[Path]:
-    """Removes the folders of runs that began before a time; returns these folders."""
-    removed = [kept.request.out for kept in kept_runs(out) if now - kept.begun > older_than]
-    _remove(out, removed)
-    return removed
+def remove_runs(out: Path, older_than: timedelta, now: datetime) -> tuple[list[Path], list[Path]]:
+    """Removes the folders of runs that began before a time; returns these, and those of runs that still go on."""
+    older = [kept.request.out for kept in kept_runs(out) if now - kept.begun > older_than]
+    stay = [folder for folder in older if _is_locked(folder)]
+    _remove(out, removed := [folder for folder in older if folder not in stay])
+    return removed, stay
+
+
+def _is_locked(folder: Path) -> bool:
+    """Returns whether a process runs in a folder."""
+    with (folder / FACTS).open() as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+    return False
 
 
 def _remove(out: Path, folders: Iterable[Path]) -> None:

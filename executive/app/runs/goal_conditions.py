@@ -88,7 +88,8 @@ def conditions_of(
 ) -> tuple[GoalCondition, ...]:
     """Returns the goal conditions of an ended tree: one for each execution of a step, and one for each answer.
 
-    A count of objects is one condition for all trips. The place of a robot must hold until the robot drives again; the
+    When the mission did not succeed, a step is judged by its executions that ended well, or else by its last one. A
+    count of objects is one condition for all trips. The place of a robot must hold until the robot drives again; the
     place or holder of an object must hold until the mission moves such an object again.
     """
     shares = (*before, Share(tree, result, len(tree.parts)))
@@ -103,9 +104,11 @@ def _conditions_of_share(share: Share, moves: Sequence[_Move], *, last: bool) ->
         if part.goal is None:
             continue
         condition = replace(part.goal, robot=share.tree.robot_name)
-        executions = [one for one in result.executions if one.path_id == _node_of(part) and one.done]
+        own = [one for one in result.executions if one.path_id == _node_of(part)]
+        failed = own if result.outcome is not Outcome.SUCCESS else []
+        executions = [one for one in own if one.done] or [one for one in failed if one.succeeded] or failed[-1:]
         if part.goal.kind in (GoalKind.ANSWERED, GoalKind.DOOR_OPEN):
-            yield from _answers(part, condition, result, done=bool(executions))
+            yield from _answers(part, condition, result, own)
             continue
         if not executions and result.outcome is not Outcome.SUCCESS:
             yield condition
@@ -113,13 +116,20 @@ def _conditions_of_share(share: Share, moves: Sequence[_Move], *, last: bool) ->
             yield _timed(condition, one, share, moves, last=last)
 
 
-def _answers(part: StepPart, condition: GoalCondition, result: RobotResult, *, done: bool) -> Iterator[GoalCondition]:
-    """Yields a condition for each yes or no that a check answered, even if the step around the check failed later."""
+def _answers(
+    part: StepPart, condition: GoalCondition, result: RobotResult, executions: Sequence[Execution]
+) -> Iterator[GoalCondition]:
+    """Yields a condition for each yes or no that a check answered, even if the step around the check failed later.
+
+    The answer is on what the last picture of its step showed; on a door, on the time at which it was given.
+    """
     below = f"{part.path_id}/"
     answers = [one for one in result.findings if f"{one.path_id}/".startswith(below) and isinstance(one.answer, bool)]
-    for finding in answers:
-        yield replace(condition, answer=bool(finding.answer), answered_s=finding.t_s)
-    if not answers and done:
+    for one in answers:
+        begun_s = max((each.began_s for each in executions if each.began_s <= one.t_s), default=one.t_s)
+        seen = condition.kind is GoalKind.ANSWERED and one.seen_s is not None and one.seen_s >= begun_s
+        yield replace(condition, answer=bool(one.answer), answered_s=one.seen_s if seen else one.t_s)
+    if not answers and any(one.done for one in executions):
         yield condition
 
 
@@ -136,13 +146,15 @@ def _timed(
     if when is When.END_OF_MISSION and (let_go or (condition.kind is GoalKind.WENT and drove)):
         when = When.END_OF_STEP
     taken_s = tuple((move.from_s, move.until_s) for move in later)
-    spoken_s = tuple(said.t_s for said in result.said if not said.asked and one.began_s <= said.t_s <= ended_s)
+    spoken = [said for said in result.said if not said.asked and one.began_s <= said.t_s < ended_s]
+    spoken = spoken if condition.kind is GoalKind.OWN else []
     return replace(
         condition,
         when=when,
         began_s=one.began_s,
         ended_s=one.ended_s,
-        spoken_s=spoken_s if condition.kind is GoalKind.GREETED else (),
+        spoken_s=tuple(said.t_s for said in spoken),
+        said=tuple(said.text for said in spoken),
         taken_s=taken_s,
     )
 

@@ -2,53 +2,44 @@
 
 import ctypes
 import gc
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
-
-from py_trees.behaviour import Behaviour
+from typing import Any, Final
 
 from executive.app.prepare.prepared import Prepared
 from executive.app.report.artifacts import Artifacts, draw_answer, save_pictures, save_views
 from executive.app.report.report_page import REPORT, EndedTree, with_findings, write_report
 from executive.app.report.run_report import RobotReport, RunReport
-from executive.app.runs.backend import Backend, Durable
+from executive.app.runs.backend import Backend, Display, Durable, OpenRun
 from executive.app.runs.goal_conditions import Share
 from executive.app.runs.signals import ended_by_signals
 from executive.app.runs.simulated import SimulatedBackend, compile_first
 from executive.record.announce import announce, map_message
 from executive.record.event_log import EventLog
 from executive.record.history import Event, read_events
-from executive.record.schemas import CONTROL, MAP, RUN, WORK
-from executive.record.work import Profile
 from executive.run.control import Control
 from executive.run.outcome import RobotResult, RunResult
 from executive.run.runner import run
 from executive.run.visitor import Progress, RunEntry, RunSettings, RunVisitor
-from executive.run.worker import LockStepWorker, ThreadWorker, TimedWorker
-from executive.tree.context import RunContext
+from executive.run.worker import LockStepWorker, ThreadWorker
 from executive.tree.node_view import NodeView, node_view
-from executive.tree.nodes.skill_leaf import ERROR_TOPIC, SkillLeaf
+from executive.tree.nodes.skill_leaf import ERROR_TOPIC
 from executive.words.goal import RefereeReport
 from executive.words.knowledge import Knowledge
 from executive.words.robot_config import named_robot
+from executive.words.schemas import CONTROL, MAP, RUN, WORK
 from plant.worlds.world import World
-from skills.api import PlanningError, Publish, Worker
+from skills.api import PlanningError, Publish
 from skills.faults.faulty_robot import FaultyRobot, inject_faults, parse_fault
 from skills.footprint import Footprint
 from skills.grid_map import load_grid_map
 from skills.inputs.errors import InputError, SpareFiles, shortage_of_files
-from skills.navigate.planner import plan_path
 from skills.quantities import clock_s
 from skills.robot import Pose2D, Robot
-
-if TYPE_CHECKING:
-    from executive.app.runs.page_view import PageView  # understands sentences
-    from executive.view.foxglove import LiveServer  # imports asyncio
 
 _FILES_RESERVED, _FILES_FREE = 32, 8
 _MOST_STARTS: Final = 1000
@@ -69,18 +60,15 @@ def run_request(
     *,
     visitors: Sequence[RunVisitor] = (),
     control: Control | None = None,
-    page: "PageView | None" = None,
-    live: "LiveServer | None" = None,
     durable: Durable | None = None,
-    profile: Profile | None = None,
     worker: ThreadWorker | None = None,
 ) -> FinishedRun:
     """Runs a prepared request and writes log, tree, report and pictures into its folder.
 
-    The `backend` is by default the plant of the request's world. `visitors` and the log watch the run, `control`
-    pauses, steps and cancels the run, `page` shows it, and `live` sends the log's messages. `durable` stores the state
-    of the run for another process to resume, or resumes an earlier run. `profile` times the subsystems. The `worker`
-    runs jobs in parallel to the ticks (None: in lock-step with the backend's clock).
+    The `backend` is by default the plant of the request's world. `visitors` watch the run, a `Display` also before and
+    after it; `control` pauses, steps and cancels it. `durable` stores the state of the run for another process to
+    resume, or resumes an earlier run. The `worker` runs jobs in parallel to the ticks (None: in lock-step with the
+    backend's clock).
 
     Raises InputError if the world or the stored state cannot be used.
     """
@@ -92,26 +80,22 @@ def run_request(
     spare = [backend.entry(replace(prepared.tree, robot_name=name), None) for name in idle]
     path, clock = out / ("log.mcap" if durable is None else durable.log), backend.clock
     with closing(FilesOfRun()) as files, closing(EventLog(path, clock, apart=prepared.several)) as log:
-        if page is not None:
-            page.serve(log, backend.show_live())
-        if live is not None:
-            live.follow(log)
+        displays = [each for each in visitors if isinstance(each, Display)]
+        journals = () if durable is None else tuple(durable.journals.values())
+        for display in displays:
+            display.opened(OpenRun(log, backend))
         log_map(log, world, prepared.knowledge)
         facts: dict[str, Any] = {"world": world.name, "seed": request.seed, "scenario": scenario.lines()}
         facts["robots"] = kinds if prepared.several else {}
         for each in prepared.all:
             announce(log, clock, each.tree.robot_name, each.tree.commands, each.knowledge, **facts)
-        journals = () if durable is None else durable.journals.values()
-        watching = [files, artifacts, log, *journals, *visitors, *([] if page is None else [page])]
+        watching = [files, artifacts, log, *journals, *visitors]
         if scenario:
             watching.append(DisturbanceLog(log, [each.robot for each in entries], backend.happened))
-        if profile is not None:
-            watching.append(RunProfile(profile, backend, (artifacts, log), journals))
         watching += backend.visitors(control := control or Control(pace=None), log)
         with ended_by_signals(control.cancel) as ending, closing(worker or LockStepWorker(clock)) as jobs:
-            at = jobs if profile is None else TimedWorker(jobs, partial(profile.timed, "planning"))
             result = run(
-                entries, clock=clock, worker=at, visitors=watching, settings=settings, control=control, spare=spare
+                entries, clock=clock, worker=jobs, visitors=watching, settings=settings, control=control, spare=spare
             )
         if durable is not None:  # the next mission of the queue begins in this one's world
             next(iter(durable.journals.values())).keep_world()
@@ -120,8 +104,8 @@ def run_request(
         counts = dict(sorted(Counter({**result.work, **backend.work(), "bytes_logged": log.bytes}).items()))
         log(WORK, counts)
     finished, recording = _conclude(prepared, backend, result, log, artifacts, counts)
-    if page is not None:
-        page.offer(recording, out / REPORT, finished.report.every_verdict())
+    for display in displays:
+        display.reported(recording, out / REPORT, tuple(finished.report.every_verdict()))
     return replace(finished, hung_up=ending.hung_up)
 
 
@@ -275,47 +259,12 @@ def preload(entry: RunEntry) -> None:
     here = Pose2D.from_transform(estimate.X_WO @ robot.odometry().X_OB)
     there = Pose2D(here.x_m, here.y_m, here.yaw_rad + 0.5)
     with suppress(PlanningError):
-        plan_path(costmap, Footprint.of(robot.capabilities()), here, there)
+        entry.stack.planner.problem(costmap, Footprint.of(robot.capabilities()), here, there, max_speed_m_s=math.inf)()
     # garbage of an earlier run is collected; then the run's long-lived objects are excluded from collection
     if gc.get_freeze_count():
         gc.unfreeze()
         gc.collect()
     gc.freeze()
-
-
-class RunProfile(RunVisitor):
-    """Timer of a run's subsystems; the rest of the time counts for the executive."""
-
-    def __init__(
-        self, profile: Profile, backend: Backend, logs: Iterable[RunVisitor], journals: Iterable[RunVisitor]
-    ) -> None:
-        """`logs` are the visitors that write the log, `journals` are the visitors that write the store."""
-        self._profile, self._backend = profile, backend
-        self._begun_s = 0.0
-        for each in logs:
-            profile.attach("log", each, "message", "tick")
-        for each in journals:
-            profile.attach("journal", each, "tick")
-
-    def begin(self, settings: RunSettings, worker: Worker) -> None:
-        """Begins the measurement, with the backend's subsystems."""
-        self._backend.attach(self._profile)
-        self._profile.begin()
-        self._begun_s = self._profile.enter()
-
-    def mission_begun(self, nodes: Sequence[Behaviour], context: RunContext) -> None:
-        """Adds a robot's estimators, detector and skills to the measurement."""
-        attach = self._profile.attach
-        attach("localiser", context.localiser, "update")
-        attach("costmap", context.costmap, "update", "add_points", "clearance_m")
-        attach("detector", context.detector, "detect", "detect_class", "detect_in_views", "detect_with_depth")
-        for leaf in nodes:
-            if isinstance(leaf, SkillLeaf):
-                attach("skills", leaf, "initialise", "update", "terminate")
-
-    def end(self, result: RunResult) -> None:
-        """Ends the measurement."""
-        self._profile.leave("executive", self._begun_s)
 
 
 class FilesOfRun(RunVisitor):

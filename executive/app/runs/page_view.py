@@ -1,6 +1,6 @@
 """Live page of a run (`--view`), which replays the run after its end."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,13 +9,13 @@ from executive.app.prepare.from_request import prepare_checked
 from executive.app.prepare.mission_files import shipped_missions
 from executive.app.prepare.prepared import Prepared
 from executive.app.report.run_report import Verdict
+from executive.app.runs.backend import Display, OpenRun
 from executive.app.runs.conversations import Conversations, load_ahead
 from executive.conversation import ReplyKind
 from executive.mission.parameters import parse_values
 from executive.mission.request import Request
-from executive.record.event_log import EventLog
 from executive.run.control import Control
-from executive.run.visitor import Progress, RunVisitor
+from executive.run.visitor import Progress
 from executive.store.missions import MissionStore
 from executive.view.feed import Feed
 from executive.view.page_control import (
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from executive.view.server import Address, PageServer, Scene
 
 
-class PageView(RunVisitor):
-    """Live page of one run: call `serve` before the run, and `offer` and then `stay` after it."""
+class PageView(Display):
+    """Live page of one run; call `stay` after it."""
 
     def __init__(
         self,
@@ -60,12 +60,12 @@ class PageView(RunVisitor):
         self._watch: ControlWatch | None = None
         self._scene: Scene | None = None
 
-    def serve(self, log: EventLog, scene: "Scene | None") -> None:
+    def opened(self, run: OpenRun) -> None:
         """Serves the page and shows its address. Raises InputError if it cannot be served there."""
         from executive.view.server import PageContent, serve
 
-        log.listen(lambda each: self._feed(each.topic, each.stamp_s, each.values))
-        self._scene = scene
+        run.log.listen(lambda each: self._feed(each.topic, each.stamp_s, each.values))
+        self._scene = scene = run.backend.show_live()
         sentences: dict[str, Action] = {}
         if self.conversations is not None:
             sentences["say"] = sentence_action(self.hear)
@@ -90,7 +90,7 @@ class PageView(RunVisitor):
         """Sends the progress to the page."""
         self._progress.tick(progress)
 
-    def offer(self, recording: Path | None, report: Path, verdicts: Iterable[Verdict] = ()) -> None:
+    def reported(self, recording: Path | None, report: Path, verdicts: Sequence[Verdict]) -> None:
         """Adds the verdicts on the ended run, its report, and its recording if there is one, to the page."""
         if self._server is not None:
             self._server.offer(recording if recording is not None and recording.is_file() else None, report)

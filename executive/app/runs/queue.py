@@ -17,7 +17,6 @@ from executive.app.runs.backend import Durable
 from executive.app.runs.folders import KeptRun, holds_run, kept_run, new_run
 from executive.app.runs.one_run import FinishedRun, log_name, return_memory, run_request
 from executive.language.questions import Answerer
-from executive.record.work import Profile
 from executive.run.control import Control
 from executive.run.visitor import RunVisitor
 from executive.store.database import STORE_FILE, StoreError
@@ -28,8 +27,7 @@ from executive.store.resuming import ended_tree, resumed_tree
 from skills.inputs.errors import InputError, shortage, shortage_of_files
 
 if TYPE_CHECKING:
-    from executive.app.runs.page_view import PageView
-    from executive.view.foxglove import LiveServer
+    pass
 
 FILES_OF_A_MISSION: Final = 200
 """Files that must be free when a queued mission begins."""
@@ -39,13 +37,10 @@ _ENDED: Final = (MissionState.SUCCESS, MissionState.FAILURE, MissionState.CANCEL
 
 @dataclass(frozen=True)
 class RunOptions:
-    """Arguments of `run_request` that a display chooses: the control, the visitors, and the page."""
+    """Arguments of `run_request` that a screen chooses: the control and the visitors."""
 
     control: Control
     visitors: Sequence[RunVisitor] = ()
-    page: PageView | None = None
-    live: LiveServer | None = None
-    profile: Profile | None = None
 
 
 class Screen(Protocol):
@@ -147,8 +142,13 @@ class MissionRuns:
         ask: Answerer | None = None,
         run: Callable[..., FinishedRun] | None = None,
         out: Path | None = None,
+        record: bool = True,
     ) -> None:
-        """`ask` answers open questions of a mission file; `run` replaces `run_request`, and `out` the missions' own."""
+        """`ask` answers open questions of a mission file; `run` replaces `run_request`, and `out` the missions' own.
+
+        Without `record` no mission leaves a recording.
+        """
+        self._records = record
         self._out = None if out is None else out.resolve()
         self._missions, self._screen, self._ask, self._run_prepared = missions, screen, ask, run or run_request
         self._control: Control | None = None
@@ -232,15 +232,19 @@ class MissionRuns:
         if prepared is None:
             prepared = prepare(mission.request, ask=self._ask)
             self._screen.tell(f"Mission {mission.id}: {name}", title=True)
+        record = self._records and prepared.request.record
+        prepared = replace(prepared, request=replace(prepared.request, record=record))
         known = begun and holds_run(out := mission.request.out) and self._out in (None, out.parent)
         asked = replace(prepared.request, out=self._out or prepared.request.out)
         kept = kept_run(mission.request.out) if known else new_run(asked, self._missions.now())
         prepared = replace(prepared, request=replace(prepared.request, out=kept.request.out))
-        with note_run(self._missions, mission, kept) as ended:
+        with kept.going_on(), note_run(self._missions, mission, kept) as ended:
             before = self._before(mission) if mission.queued and resumed is None else None
             durable = durable_run(self._missions, mission, prepared, before) if resumed is None else resumed.durable
             with self._screen.watch(prepared) as options, self._cancelling(options.control):
-                finished = self._run_prepared(prepared, durable=durable, **vars(options))
+                finished = self._run_prepared(
+                    prepared, durable=durable, control=options.control, visitors=options.visitors
+                )
             self._screen.conclude(finished)
             ended(finished.report)
         report, past, hung_up = finished.report, None if resumed is None else resumed.lines, finished.hung_up

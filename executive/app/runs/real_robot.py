@@ -27,8 +27,8 @@ from executive.words.variation import NO_VARIATION
 from plant.worlds.world import World
 from skills.inputs.errors import InputError, one_line
 from skills.inputs.yaml_source import scalar_of
-from skills.robot import Clock, ConnectedRobot, Pose2D, RobotStoppedError
-from skills.stack import RobotBackend, RobotStack, StackError, robot_backend
+from skills.robot import Clock, ConnectedRobot, Pose2D, RobotBackend, RobotStoppedError
+from skills.stack import RobotStack, StackError, robot_backend
 
 _ADDRESS: Final = re.compile(r"(?P<scheme>[A-Za-z][A-Za-z0-9+.-]*)://(?P<place>[^?\s]+)(\?(?P<options>\S*))?")
 

@@ -15,8 +15,6 @@ from executive.app.report.artifacts import Artifacts, draw_artifacts
 from executive.app.runs.backend import Backend, Durable
 from executive.app.runs.goal_conditions import Share, verdict_of
 from executive.record.history import RECORDING
-from executive.record.schemas import POSE, SPEECH, TRUTH, pose_values
-from executive.record.work import Profile
 from executive.run.control import Control
 from executive.run.control_state import OpenQuestion
 from executive.run.outcome import RobotResult
@@ -24,6 +22,7 @@ from executive.run.visitor import Progress, RunEntry, RunVisitor
 from executive.run.worker import WorkThread
 from executive.tree.compiler import CompiledTree
 from executive.words.goal import RefereeReport
+from executive.words.schemas import POSE, SPEECH, TRUTH, pose_values
 from executive.words.variation import NO_VARIATION, Variation
 from plant.engine import Pipeline
 from plant.recording import LiveScene
@@ -33,10 +32,9 @@ from plant.simulation import Simulation
 from plant.snapshot_file import SnapshotError
 from plant.worlds.world import World, WorldError
 from skills.api import PICTURES, TOUCHES, Publish
-from skills.grid_map import load_grid_map
+from skills.compiled import distances
+from skills.grid_map import load_grid_map, map_columns
 from skills.inputs.errors import InputError
-from skills.manipulation.arm.solid_cells import map_columns
-from skills.navigate.lattice import search
 from skills.robot import Clock, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
 
@@ -128,15 +126,6 @@ class SimulatedBackend(Backend):
         """The plant's work counters by name."""
         return self._settled().work()
 
-    def attach(self, profile: Profile) -> None:
-        """Times the plant's steps, the referee, and each robot's control, sensors and cameras."""
-        profile.attach("plant", self._simulation.engine, "step")
-        profile.attach("referee", self._simulation.referee, "observe")
-        for robot in self._simulation.robots.values():
-            profile.attach("joint control", robot, "control")
-            profile.attach("LiDAR and other sensors", robot, "sense")
-            profile.attach("rendering", robot, "image")
-
     def show_live(self) -> LiveScene:
         """Starts the plant's live picture."""
         return self._simulation.show_live()
@@ -159,9 +148,9 @@ class SimulatedBackend(Backend):
 
 
 def kernels_folder(cache: Path | None = None) -> tuple[Path, bool]:
-    """Returns the folder of compiled code, and whether it has the planner's search; `cache` is by default numba's."""
-    folder = cache or Path(search.machine_code.stats.cache_path)  # type: ignore[attr-defined]
-    return folder, any(folder.glob("lattice.search-*.nbi"))
+    """Returns the folder of compiled code, and whether it has any; `cache` is by default numba's."""
+    folder = cache or Path(distances.machine_code.stats.cache_path)  # type: ignore[attr-defined]
+    return folder, any(folder.glob("compiled.distances-*.nbi"))
 
 
 def compile_first(cache: Path | None = None) -> None:
@@ -231,7 +220,7 @@ def run_entry(
         robot=robot,
         localiser=localiser,
         costmap=stack.costmap.build(keepout_map),
-        detector=shared_detector(stack, world),
+        detector=shared_detector(stack, world, tree.tags),
         stack=stack,
         solid_columns=map_columns(scan_maps, tree.surfaces),
     )
@@ -300,5 +289,5 @@ class Bystanders(RunVisitor):
         self._heard[key] = (since_s, None)
         answer = self._simulation.listeners.answer(person, question.text, question.options)
         if answer is not None:
-            with suppress(ValueError):  # the answer is none of the options
-                self._control.answer(each.id, answer)
+            with suppress(ValueError):  # somebody else has answered
+                self._control.answer(each.id, answer, spoken=True)

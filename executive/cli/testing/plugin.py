@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from skills.testing.clock import VirtualClock
     from skills.testing.robot import ScriptedRobot
 
+pytest.register_assert_rewrite("executive.app.task_suite", "executive.testing.skill_suite")
+
 SUFFIX = ".skilltest.yaml"
 _ROBOT = "Alice"
 _SETTINGS: pytest.StashKey[SkillTestSettings] = pytest.StashKey()

@@ -14,7 +14,6 @@ from executive.language.questions import RefusalError
 from executive.language.structure.conditions import Done, parse_condition, parse_wait, statement_of_check
 from executive.language.structure.plain import PlainReader, PlainReading, SpokenCondition, State, attempt, require
 from executive.language.templates import Match, words_of
-from executive.words.command import Task
 from executive.words.leaf_steps import Awaited, Do, Speak, Wait
 from executive.words.step import OnFailure, Step
 from executive.words.steps import Choose, Group, Loop, Repeat, Steps, Together, Try
@@ -297,7 +296,7 @@ class Builder:
     def _replace_missing(self, asked: SpokenCondition, said: str, body: Sequence[Clause]) -> None:
         """Builds a choice: the last steps if their object is found (at its source), otherwise the steps of the body."""
         done = tuple(self.steps[-asked.steps :])
-        puts = any(command.task is Task.PLACE for step in done for command in step.commands)
+        puts = any(command.puts for step in done for command in step.commands)
         two_places = puts and re.search(r"\bthere$", said, re.IGNORECASE) is not None
         require(not two_places, f"'{said}' could mean two places; name the place", said)
         otherwise, state = self.nest(body, asked.fails, asked.opposite)
@@ -392,7 +391,11 @@ def _times(cue: Clause, every_s: float | None) -> int | None:
 def _only_goes(steps: Steps) -> bool:
     """Returns whether steps only go to one place, or charge."""
     commands = [command for step in steps for command in step.commands if isinstance(step, Do)]
-    return len(steps) == len(commands) == 1 and not commands[0].item and commands[0].task in (None, Task.CHARGE)
+    return (
+        len(steps) == len(commands) == 1
+        and not commands[0].item
+        and (commands[0].task is None or commands[0].task.docks)
+    )
 
 
 def _repeat(loop: Loop, steps: Steps) -> Steps:

@@ -14,11 +14,11 @@ from executive.language.roles import HERE
 from executive.language.spelling import synonyms_of
 from executive.language.structure.plain import PlainReader, SpokenCondition, State, attempt, require, with_preposition
 from executive.language.templates import Match, page
-from executive.words.command import Task
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Not, ValueIs
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Awaited, Charging, Dock, DoorToOpen, OpenDoor, Picture, Subject, Wait
 from executive.words.steps import Steps
+from executive.words.task import basic
 from skills.inputs.errors import listing
 
 _P: Final = page("conditions")
@@ -288,7 +288,7 @@ def _pictured(what: str, state: State, reader: PlainReader) -> str:
     finds, *more = reader.read_commands(what, state, (verb("find"),)).commands
     if more or finds.object is None or finds.object.relations or finds.object_count != 1:
         raise RefusalError(f"I cannot tell in a picture which one is '{what}'", [what])
-    usual = finds.goal == reader.knowledge.default_place(Task.FIND, finds.object.name)
+    usual = finds.goal == reader.knowledge.default_place(basic().look, finds.object.name)
     require(usual, f"I take a picture of the first {finds.object} that I see, not of '{what}'", what)
     return str(finds.object)
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from executive.language.clauses import CLAUSES
@@ -19,12 +20,13 @@ from executive.language.reference import Memory
 from executive.language.roles import HERE, Location
 from executive.language.templates import Page, page
 from executive.language.tokens import Token
-from executive.words.command import START, Command, Task
+from executive.words.command import START, Command
 from executive.words.condition import AllOf, Condition, DoorOpen, Look, Not
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Do, steps_of_commands
 from executive.words.outlines import inside
 from executive.words.steps import Steps
+from executive.words.task import basic
 from skills.api import ObjectKind
 
 _LEFT_OUT: Final = frozenset({"not", "n't", "but", "except", "instead", "rather", "neither", "nor"})
@@ -54,7 +56,8 @@ class State:
 
     `memory` has the referents, `held` the object in the gripper, `goal` the robot's last destination, `at` its room
     (None: unknown), `door` the last door, `recipient` the default recipient of objects. `somebody` is True after a
-    condition has found anybody in the remembered place. `notes` list words that were interpreted as others.
+    condition has found anybody in the remembered place. `notes` list words that were interpreted as others, `carried`
+    are the commands that have put an object somewhere.
     """
 
     memory: Memory = field(default_factory=Memory)
@@ -65,6 +68,7 @@ class State:
     recipient: Location | None = None
     somebody: bool = False
     notes: tuple[str, ...] = ()
+    carried: tuple[Command, ...] = ()
 
     @classmethod
     def initial(cls, knowledge: Knowledge, memory: Memory) -> State:
@@ -80,6 +84,7 @@ class State:
             held=self.held if self.held == other.held else None,
             goal=self.goal if self.goal == other.goal else None,
             at=self.at if self.at == other.at else None,
+            carried=tuple(one for one in self.carried if one in other.carried),
         )
 
     def noting(self, notes: Iterable[str]) -> State:
@@ -129,7 +134,7 @@ class SpokenCondition:
 
     def at_source(self, steps: Steps, text: str) -> SpokenCondition:
         """Adds to a condition without a place ("if there is one") the place from which the object is taken."""
-        taken = next((c for step in steps for c in step.commands if c.task is Task.GRASP), None)
+        taken = next((c for step in steps for c in step.commands if c.takes), None)
         look = self.condition.part if isinstance(self.condition, Not) else self.condition
         placed = re.search(r"\b(?:in|on|at|inside|near)\b", text, re.IGNORECASE)
         if taken is None or placed or not isinstance(look, Look) or look.command.object != taken.object:
@@ -190,11 +195,14 @@ class PlainReader:
     knowledge: Knowledge
     _traces: dict[tuple[Trace, str | None, str | None], Trace] = field(default_factory=dict, compare=False, repr=False)
 
-    def forms(self, name: str) -> Page:
-        """Templates of a page that leaves open the names of people and places; the longest names come first."""
+    def forms(self, name: str, file: Path | None = None) -> Page:
+        """Templates of a page that leaves open the names of people and places; the longest names come first.
+
+        The page is in a `file` of a plug-in, or this package's own by its name.
+        """
         names = {"names": self.knowledge.people, "around": self.knowledge.place_names()}
         spelt = {key: self.knowledge.spellings(each) for key, each in names.items()}
-        return page(name, **{key: tuple(sorted(each, key=len, reverse=True)) for key, each in spelt.items()})
+        return page(name, file=file, **{key: tuple(sorted(each, key=len, reverse=True)) for key, each in spelt.items()})
 
     def read(
         self, state: State, text: str = "", *, behind: str | None = None, upto: str | None = None, **inputs: Any
@@ -206,7 +214,7 @@ class PlainReader:
         if (trace := self._traces[key]).refusal is not None:
             raise copy(trace.refusal)
         commands = trace.commands
-        if commands and state.held is not None and (commands[0].task, commands[0].object) == (Task.GRASP, state.held):
+        if commands and state.held is not None and commands[0].takes and commands[0].object == state.held:
             commands = commands[1:]
         return PlainReading(commands, self.state_after(commands, trace.memory, state).noting(trace.notes), trace)
 
@@ -224,9 +232,12 @@ class PlainReader:
 
     def go_to(self, text: str, state: State, *, by: str = "go") -> PlainReading:
         """Understands going to a place, which a noun phrase, "here" or "there" names."""
-        spot = text.lower() in ("here", "there")
-        items = (Adverb(here=text.lower() == "here"),) if spot else self.read_items(text)
-        return self.commands_from_items((verb(by), *with_preposition(items, "to")), state)
+        if text.lower() in ("here", "there"):
+            return self.commands_from_items((verb(by), Adverb(here=text.lower() == "here")), state)
+        if re.match(r"(?:every|each|all) ", text, re.IGNORECASE):  # perhaps "but the hall"
+            read = self.read(State(), f"to {text}", lead=(verb(by),), upto="reading").trace
+            return self.read(state, behind="reading", items=read.items, unwanted=read.unwanted)
+        return self.commands_from_items((verb(by), *with_preposition(self.read_items(text), "to")), state)
 
     def check(self, text: str, state: State, said: str = "") -> SpokenCondition:
         """Condition that the statement in a text holds; `said` are the full words of the speaker."""
@@ -244,7 +255,7 @@ class PlainReader:
         unseen = RefusalError(f"I cannot see whether '{text}'; {_SEES}", [text])
         if isinstance(reading, RefusalError):
             raise unseen if reading.kind is RefusalKind.NOT_UNDERSTOOD else reading
-        if {command.task for command in reading.commands} != {Task.FIND}:
+        if not reading.commands or not all(command.looks for command in reading.commands):
             raise unseen
         one = not any(action.choices for action in reading.trace.actions)
         require(one, f"I cannot tell which one '{text}' means; name one", text)
@@ -284,7 +295,7 @@ class PlainReader:
 
     def _condition_of_looks(self, reading: PlainReading, state: State, before: State, text: str) -> SpokenCondition:
         """Condition that the looks in a reading succeed; `text` is the full text."""
-        looks = tuple(Look.from_command(command) for command in reading.commands if command.task is Task.FIND)
+        looks = tuple(Look.from_command(command) for command in reading.commands if command.looks)
         known = self._state_if_seen(reading, state).noting(reading.trace.notes)
         fails = known.recalling(where=None, locations=before.memory.locations)
         return SpokenCondition(looks[0] if len(looks) == 1 else AllOf(parts=looks), text, known, fails)
@@ -292,13 +303,13 @@ class PlainReader:
     def last_check(self, reading: PlainReading, before: State, said: str = "") -> SpokenCondition | None:
         """Look or fetch that the last command of a reading stands for; `said` is the statement of the look."""
         commands = reading.commands
-        if commands and commands[-1].task is Task.FIND:
-            looks = sum(command.task is Task.FIND for command in commands)
+        if commands and commands[-1].looks:
+            looks = sum(command.looks for command in commands)
             return replace(self._condition_of_looks(reading, reading.state, before, said), looked=True, steps=looks)
-        taken = next((command for command in reversed(commands) if command.task is Task.GRASP), None)
+        taken = next((command for command in reversed(commands) if command.takes), None)
         if taken is None:
             return None
-        found = Look.from_command(replace(taken, task=Task.FIND, verb="find"))
+        found = Look.from_command(replace(taken, task=basic().look, verb="find"))
         fails = replace(reading.state.elsewhere, held=None).recalling(where=None, locations=before.memory.locations)
         return SpokenCondition(found, "", reading.state, fails, steps=len(commands))
 
@@ -321,15 +332,15 @@ class PlainReader:
 
     def state_after(self, commands: Sequence[Command], memory: Memory, state: State) -> State:
         """State after some commands."""
-        held, goal = state.held, state.goal
+        held, goal, carried = state.held, state.goal, state.carried
         for command in commands:
-            if command.task is Task.GRASP:
+            if command.takes:
                 held = command.object
             elif command.item is not None and command.goal is not None:
-                held = None
+                held, carried = None, (*carried, command)
             goal = command.goal if command.goal is not None else goal
         at = self._room_after(commands[-1]) if commands else state.at
-        return replace(state, memory=memory, held=held, goal=goal, at=at)
+        return replace(state, memory=memory, held=held, goal=goal, at=at, carried=carried)
 
     def _room_after(self, command: Command) -> str | None:
         """Room of the robot after a command; None if it is unknown."""

@@ -1,37 +1,41 @@
 """Reads a sentence with conditions, loops, waits or speech, and builds the steps of its actions."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from functools import cache
 from itertools import dropwhile
 from typing import Final
 
 from pydantic import ValidationError
 
-from executive.language.clauses import CHECKS, Clause, Cue, begins_as, split, trailing_cue
-from executive.language.coverage import TOLD, note_adverbs
+from executive.language.amounts import parse_seconds
+from executive.language.clauses import CHECKS, Clause, Cue, begins_as, cut, split, trailing_cue
+from executive.language.coverage import note_adverbs
 from executive.language.items import verb, without_objects
-from executive.language.nouns import NounKind
 from executive.language.pipeline import Pipeline, Trace
-from executive.language.questions import RefusalError, RefusalKind
+from executive.language.questions import ClarifyingQuestion, RefusalError, RefusalKind, Slot
 from executive.language.reference import Memory
 from executive.language.roles import Location
 from executive.language.structure.builder import Builder, is_paced
-from executive.language.structure.conditions import REQUESTS, Done, parse_condition, statement_of_check
-from executive.language.structure.plain import PlainReader, State, attempt, named, require
-from executive.language.structure.speaking import ROOMS, SPEECH, asks, is_clause, say_in_each_room, says
-from executive.language.templates import Match, page
-from executive.words.command import SPEAKER, START, Command, Task
+from executive.language.structure.conditions import REQUESTS, parse_condition, statement_of_check
+from executive.language.structure.plain import PlainReader, PlainReading, State, T, attempt, require
+from executive.language.structure.speaking import ROOMS, SPEECH, say_in_each_room, says
+from executive.language.task_sentences import task_again, task_openers, task_requests
+from executive.language.templates import Match, words_of
+from executive.language.tokens import smooth
+from executive.words.command import SPEAKER, START, Command
 from executive.words.condition import Look
-from executive.words.knowledge import ANYBODY
 from executive.words.leaf_steps import Check, Do, Speak, steps_of_commands
 from executive.words.step import Step
 from executive.words.steps import Ask, Choose, Repeat, Together, Try
+from executive.words.task import Part, Task
 from skills.api import ObjectKind
 from skills.inputs.errors import listing
+from skills.inputs.plugins import SENTENCES, PluginDefect, installed_plugins, run_plugin
 from skills.inputs.schema import first_error
 
-_PEOPLE: Final = page("people")
 MOST_NESTED: Final = 2
 MOST_CLAUSES: Final = 24
 
@@ -52,13 +56,17 @@ def act(row: Builder, clause: Clause) -> None:
 
 
 def _skips(row: Builder, clause: Clause) -> bool:
-    """Skips "do nothing", and "tell me the result" behind a look, which the robot answers in any case."""
-    idle, answered = (CHECKS[intent].fullmatch(clause.text) is not None for intent in ("idle", "answered"))
+    """Skips "do nothing", and "tell me the result" behind what gives an answer, which the robot says in any case."""
+    idle, answered, value = (CHECKS[intent].fullmatch(clause.text) for intent in ("idle", "answered", "value"))
     if idle or answered:
         row.flush()
-    looked = answered and row.asked is not None and row.asked.looked
+    before = [*row.steps[-1].walk()][-1].commands[-1:] if row.steps and not row.plain else ()
+    words = {word for each in row.clauses[: row.at - 1] for word in words_of(each.text).words}
+    told = answered is not None or (value is not None and value["what"].lower() in {"", *words})
+    looked = answered is not None and row.asked is not None and row.asked.looked
+    looked = looked or (told and any(one.task is not None and one.task.answers for one in before))
     row.special = row.special or looked
-    return idle or looked
+    return idle is not None or looked
 
 
 def _requests(row: Builder, clause: Clause) -> bool:
@@ -97,146 +105,95 @@ def _people_at(group: Location, who: str, state: State, reader: PlainReader) -> 
     return require(people, f"I know nobody in the {room} to bring anything to: {who}", who)
 
 
-def _meets_people(row: Builder, clause: Clause) -> bool:
-    """Adds a request about people."""
+def _does_task(row: Builder, clause: Clause) -> bool:
+    """Adds a request that a sentence on the page of a task matches."""
     found = trailing_cue(clause.text)
-    if found is not None and found.kind in (Cue.WHILE, Cue.UNTIL):
-        found = None  # how long the robot follows
-    request = _parse_people(clause.text if found is None else found.before, row.reader)
-    if request is None or not _asks_alone(request, row):
-        return False
-    if found is not None:
+    begun = found is None or any(one.slots for one in task_requests(found.before).values())
+    if found is not None and not begun and found.kind in (Cue.EVERY, Cue.TIMES) and found.text:
+        found = replace(found, before=f"{found.before} {found.text}", text="")  # "vacuum twice in the hall"
+    text = clause.text if found is None else found.before
+    again, first = task_again(text), not (row.steps or row.plain)
+    if found is not None and (again or task_requests(text)):
+        require(not again, f"it is not clear which action '{found.cue}' belongs to; say it first", found.cue)
         row.modify(clause, found)
         return True
-    _flush_reasons(row)
-    row.put(*_steps_on_people(request, row.state, row.reader))
+    parts = [each for one in again or [text] * first for each in cut(smooth(one))] if task_openers() else []
+    if found is None and len(parts) > 1 and (again or task_requests(parts[-1].text)):
+        row.insert(parts)
+        return True
+    if not (asked := task_requests(text)):
+        return False
+    row.flush()
+    alike = "" if len(asked) == 1 else listing((task.named for task in asked), last="or")
+    require(not alike, f"'{clause.text}' is a sentence of {alike}; say it in other words", clause.text)
+    ((task, match),) = asked.items()
+    commands, state = _task_commands(task, match, row.state, row.reader)
+    row.put(steps_of_commands(commands), row.reader.state_after(commands, state.memory, state))
     return True
 
 
-def _asks_alone(request: Match, row: Builder) -> bool:
-    """Returns whether a form is a request; finding somebody is one only before another about the same person."""
-    refers = _PEOPLE["refers"].search(row.ahead()) is not None
-    match request["form"]:
-        case "find":
-            return refers or (row.special and _refers_to_person(request))
-        case "stated":
-            return refers and _parse_people(row.ahead(), row.reader) is not None
+def _does_more(row: Builder, clause: Clause) -> bool:
+    """Adds a request that a plug-in understands by itself."""
+    return any(does(row, clause) for does in _own_acts())
+
+
+@cache
+def _own_acts() -> tuple[Callable[[Builder, Clause], bool], ...]:
+    """Functions of plug-ins that add the steps of a clause, in the order of their names; without broken ones."""
+    found = list[Callable[[Builder, Clause], bool]]()
+    for entry in sorted(installed_plugins(SENTENCES), key=lambda entry: entry.name):
+        with suppress(PluginDefect):
+            found.append(run_plugin(entry, entry.load))
+    return tuple(found)
+
+
+def _task_commands(task: Task, match: Match, state: State, reader: PlainReader) -> tuple[list[Command], State]:
+    """Commands of a request for a task, one for each of its places or objects, with the state that knows them."""
+    said, what, goals = match.text, match["object"], [Command()]
+    if match["goal"]:
+        there = reader.go_to(match["goal"], state)
+        state, goals = there.state, [one for one in there.commands if one.goal is not None]
+        people = [one.goal for one in goals if one.goal in reader.knowledge.people]
+        require(task.goal_is is not Part.PLACE or not people, f"'{said}': {listing(people)} is no place", match["goal"])
+    _ask_for(any(at.goal for at in goals) or not task.needs_goal, f"{said}: where?", Slot.PLACE)
+    match task.object_is:
+        case Part.NOTHING:
+            objects = [Command()]
+        case Part.THING:
+            wanted = _ask_for(what, f"{said}: what?", Slot.THING)
+            read = reader.read_commands(wanted, state, (verb("find"),))
+            state, objects = read.state, [_where_it_is(one, read, reader, said) for one in read.commands if one.looks]
+            people = [str(one.object) for one in objects if reader.knowledge.somebody(str(one.object)) is not None]
+            require(not people, f"'{said}': {listing(people)} is no object", wanted)
+            one = task.several or all(each.object_count == 1 for each in objects)
+            require(one, f"'{said}' is for one object at a time; say how often, as in 'twice'", wanted)
+            require(objects[1:] or wanted.lower() != "them", f"which objects are '{wanted}'? Name each", wanted)
+        case Part.PERSON:
+            person = SPEAKER if what.lower() in ("", "me", "us") else reader.knowledge.person(what)
+            objects = [Command(object=ObjectKind(require(person, f"I know nobody called '{what}'", what)))]
+        case Part.TIME:
+            seconds = _ask_for(parse_seconds(what), f"{said}: for how long?", Slot.THING)
+            objects = [Command(object=ObjectKind("second"), object_count=round(seconds))]
         case _:
-            return True
+            objects = [Command(object=ObjectKind(_ask_for(what, f"{said}: what?", Slot.THING)))]
+    doing, each = said.split(maxsplit=1)[0].lower(), [(at if at.goal else one, one) for at in goals for one in objects]
+    return [replace(one, goal=at.goal, goal_at=at.goal_at, task=task, verb=doing) for at, one in each], state
 
 
-def _flush_reasons(row: Builder) -> None:
-    """Understands the pending clauses; skips a mere reason ("Robin is lost"), which is no request."""
-    refusal = attempt(row.flush)
-    if not isinstance(refusal, RefusalError):
-        return
-    reasons = " ".join(clause.text for clause in row.plain)
-    if refusal.kind is not RefusalKind.NOTHING_TO_DO or not is_clause(reasons, row.reader.pipeline.parser):
-        refusal.plain = False
-        raise refusal
-    row.plain, row.state = [], row.state.noting([TOLD.format(repr(reasons))])
-    people = [name for name in row.reader.knowledge.people if re.search(rf"\b{re.escape(name)}\b", reasons)]
-    if len(people) == 1:
-        row.state = row.state.recalling(person=named(people[0]))
+def _ask_for(given: T | None, asked: str, slot: Slot) -> T:
+    """Returns what a sentence of a task must say. Raises RefusalError with a question when it does not say it."""
+    return require(given, asked, question=ClarifyingQuestion(asked[:1].upper() + asked[1:], slot))
 
 
-def _parse_people(text: str, reader: PlainReader) -> Match | None:
-    """Parses a clause about following, guiding, meeting or greeting people; None for other clauses.
-
-    The match has the `task`, the person `who` (empty: the speaker), and the places `at` and `to`; its `form` is "find"
-    or "stated" if it asks for nothing alone. Raises RefusalError when it is not clear whom the clause means.
-    """
-    forms, knowledge = reader.forms("people"), reader.knowledge
-    text = text if (around := forms["around"].fullmatch(text)) is None else around["clause"]
-    match = forms["request"].fullmatch(text)
-    if match is not None or forms["certain"].match(text) is None or forms["greets_known"].match(text) is not None:
-        return match
-    known = f"; known are {listing(knowledge.people)}" if knowledge.people else ""
-    hint = f"name one person, or say 'the person in the kitchen'{known}"
-    if (cue := trailing_cue(text)) is not None and _parse_people(cue.before, reader) is not None:
-        what, hint = f"I cannot do '{cue.before}' {cue.cue} {cue.text}", "I do it up to a place, or until you say stop"
-    elif (unseen := forms["unseen"].search(text)) is not None:
-        what = f"I cannot tell people apart by {unseen['by']}, such as '{unseen.text}'"
-    elif (crowd := forms["crowd"].search(text)) is not None:
-        what = f"I follow and guide one person at a time, not '{crowd.text}'"
-    else:
-        what = f"I do not understand whom and where '{text}' means"
-    raise RefusalError(f"{what}; {hint}", [text])
-
-
-def _refers_to_person(match: Match) -> bool:
-    """Returns whether a pronoun refers to the person of a request."""
-    return bool(match["him"] or match["that_person"])
-
-
-def _steps_on_people(request: Match, state: State, reader: PlainReader) -> Done:
-    """Builds the steps for a request, with the state after them. Raises RefusalError."""
-    person, said, task = _person(request, state, reader), request.text, request["task"]
-    spoken_of = person == ANYBODY and _refers_to_person(request) and state.memory.person is None
-    at = _place(request["at"] or ("there" if spoken_of and state.memory.place else ""), state, reader)
-    goal, state = _goal(request, person, state, reader)
-    if task in ("greet", "") and at is None and reader.is_place(state.goal):
-        at = state.goal
-    greets_there = task == "greet" or (not task and person == ANYBODY)
-    require(at or not greets_there, f"{said}: in which room?", question=True)
-    require(goal or task != "guide", f"{said}: where to?", question=True)
-    require(person != SPEAKER or goal != START, f"{said}: you are here; name another place", said)
-    commands = _commands_on(request, person, at, goal, state)
-    return steps_of_commands(commands), _state_behind(commands, person, state, reader)
-
-
-def _commands_on(request: Match, person: str, at: str | None, goal: str | None, state: State) -> list[Command]:
-    """Commands of a request about a person; for anybody the robot only goes to the place, unless it is there."""
-    verb, anybody = request.text.split()[0].lower(), person == ANYBODY
-    meets = Command(goal=at, verb=verb) if anybody else Command(goal=person, goal_at=at, verb=verb)
-    first = [] if anybody and at == state.goal else [meets]
-    match request["task"]:
-        case "":
-            return first
-        case "greet":
-            count = 0 if anybody and not request["one"] else 1
-            return [Command(None, at, None, Task.GREET, ObjectKind(ANYBODY), object_count=count, verb=verb)]
-        case task:
-            does = Command(goal=goal, task=Task(task), object=ObjectKind(person), verb=verb)
-            return [does] if at is None else [*first, does]
-
-
-def _goal(request: Match, person: str, state: State, reader: PlainReader) -> tuple[str | None, State]:
-    """Goal of a request, and the state with a note on whose home it is. Raises RefusalError for an unknown home."""
-    goal, knowledge = _place(request["to"], state, reader), reader.knowledge
-    if request["to"].lower() != "home" or goal is not None:
-        return goal, state
-    facts = require(knowledge.people.get(person), f"{request.text}: which room is home?", "home", question=True)
-    home = knowledge.room(facts.at)
-    return home, state.noting([f"I take {person}'s home to be the {home}"])
-
-
-def _state_behind(commands: Sequence[Command], person: str, state: State, reader: PlainReader) -> State:
-    """State after a request about a person, whom the robot may have followed anywhere."""
-    last, memory = commands[-1] if commands else Command(), replace(state.memory, person=named(person))
-    if last.goal is not None and reader.is_place(last.goal):
-        memory = replace(memory, place=named(last.goal, NounKind.PLACE))
-    after = reader.state_after(commands, memory, state)
-    return after.elsewhere if last.task is Task.FOLLOW and last.goal is None else after
-
-
-def _person(match: Match, state: State, reader: PlainReader) -> str:
-    """Person that a request is about: known, the speaker or anybody. Raises RefusalError for an unclear pronoun."""
-    before, who, said = state.memory.person, match["who"], match.text
-    if not who:
-        require(not match["at"], f"you are not there: '{said}'; say only where to", match["at"])
-        return SPEAKER
-    if _refers_to_person(match) and before is not None and match["task"] != "greet":
-        return reader.knowledge.person(before.name) or before.name
-    require(not match["him"] or state.somebody, f"who is meant by '{who}' in '{said}'?", who, question=True)
-    return reader.knowledge.person(who) or ANYBODY
-
-
-def _place(text: str, state: State, reader: PlainReader) -> str | None:
-    """World's name for a place in words; None without words, and for "home" where no place is called so."""
-    if text.lower() in ("", "home"):
-        return reader.knowledge.place(text)
-    return START if text.lower() in ("here", "back") else reader.place(text, state)
+def _where_it_is(look: Command, read: PlainReading, reader: PlainReader, said: str) -> Command:
+    """Looks for a certain object, which was carried before, where it was put. Raises RefusalError for who has it."""
+    carried = next((one for one in reversed(read.state.carried) if one.item == look.object), None)
+    certain = (one.again or (one.target and not one.target.indefinite) for one in read.trace.resolved[-1:])
+    if carried is None or read.trace.actions[-1].source is not None or not any(certain):
+        return look
+    who = "you have" if carried.goal == START else f"{carried.goal} has"
+    require(reader.is_place(carried.goal), f"'{said}': {who} it then; say where it is")
+    return replace(look, goal=carried.goal, goal_at=carried.goal_at)
 
 
 def _checks(row: Builder, clause: Clause) -> bool:
@@ -272,16 +229,17 @@ def _searches_rooms(row: Builder, clause: Clause) -> bool:
     looks, ahead = ROOMS["search"].fullmatch(clause.text), row.ahead()
     if ROOMS["goes_everywhere"].fullmatch(clause.text) is not None:
         looks = ROOMS["what_there"].fullmatch(ahead) or ROOMS["search"].fullmatch(ahead)
-        says = looks is None and SPEECH["speaks"].match(ahead) is not None and trailing_cue(ahead) is None
-        row.at += says or looks is not None
-        if says:
+        does = SPEECH["speaks"].match(ahead) is not None or words_of(ahead).word(0) in task_openers()
+        does = does and looks is None and trailing_cue(ahead) is None
+        row.at += does or looks is not None
+        if does:
             say_in_each_room(row, ahead)
             return True
     if looks is None:
         return False
     what = looks["what"]
     reading = row.reader.read_commands(what, row.known(), (verb("find"),))
-    looks_only = all(one.task is Task.FIND for one in reading.commands)
+    looks_only = all(one.looks for one in reading.commands)
     nowhere = re.search(r"\b(?:in|on|at|near)\b", what) is None
     require(looks_only and nowhere, f"I cannot look for {listing([what])} in every room", what)
     commands = tuple(replace(command, goal=None, goal_at=None) for command in reading.commands)
@@ -291,7 +249,17 @@ def _searches_rooms(row: Builder, clause: Clause) -> bool:
     return True
 
 
-_ACTS: Final = (_skips, _meets_people, _requests, asks, says, _checks, _is_modified, _brings_to_all, _searches_rooms)
+_ACTS: Final = (
+    _skips,
+    _does_task,
+    _does_more,
+    _requests,
+    says,
+    _checks,
+    _is_modified,
+    _brings_to_all,
+    _searches_rooms,
+)
 """Actions in the order of trying."""
 
 

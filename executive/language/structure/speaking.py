@@ -1,29 +1,26 @@
-"""Adds speech and questions to somebody, behind the drive to the listener."""
+"""Adds speech, behind the drive to the listener."""
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
-from executive.language.clauses import CHECKS, CLAUSES, Clause, Cue, begins_as, end_of_scope, trailing_cue
-from executive.language.items import Chunk, predicates
+from executive.language.clauses import CLAUSES, Clause, Cue, trailing_cue
+from executive.language.items import predicates
 from executive.language.lexicon import lexicon, read_table
 from executive.language.limits import refuse_harm
 from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
 from executive.language.structure.builder import Builder
 from executive.language.structure.conditions import parse_condition
-from executive.language.structure.plain import PlainReader, attempt, named, require
+from executive.language.structure.plain import PlainReader, attempt, require
 from executive.language.templates import Match, page, words_of
-from executive.words.command import PEOPLE_TASKS
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Speak
-from executive.words.steps import Ask, Steps
-from skills.inputs.errors import listing, with_article
+from skills.inputs.errors import listing
 
 ROOMS: Final = page("rooms")
 SPEECH: Final = page("speech", noted=tuple(map(" ".join, lexicon().noted)))
-_ANSWERS: Final[dict[Cue | None, str]] = {Cue.SO: "yes", Cue.NOT: "no", Cue.OTHERWISE: "no"}
 
 
 def says(row: Builder, clause: Clause) -> bool:
@@ -41,7 +38,7 @@ def says(row: Builder, clause: Clause) -> bool:
         left_out = [row.reader.room(each, row.state) for each in re.split(r",? and |, ", everywhere["except"]) if each]
         say_in_each_room(row, everywhere["said"], left_out)
         return True
-    if (found := _cue_behind_speech(text)) is not None:
+    if (found := cue_behind_speech(text)) is not None:
         row.modify(clause, found)
         return True
     if (said := _parse_speech(text, row.reader)) is not None:
@@ -49,7 +46,7 @@ def says(row: Builder, clause: Clause) -> bool:
     return said is not None
 
 
-def _cue_behind_speech(text: str) -> Clause | None:
+def cue_behind_speech(text: str) -> Clause | None:
     """Cue that is no part of what is said. Raises RefusalError when that is not clear."""
     if (found := trailing_cue(text)) is None:
         return None
@@ -69,8 +66,8 @@ def _speaks(row: Builder, said: Match) -> None:
     require(clear, f"I cannot tell the words to say from where or when in '{text}'; begin 'say that'", text)
     words = require(said["text"] or row.statement, f"what am I to say in '{text}'?", text)
     row.flush()
-    _goes_to_listener(row, said)
-    row.put((Speak(speak=_escape_braces(words)),), row.state)
+    goes_to_listener(row, said)
+    row.put((Speak(speak=escape_braces(words)),), row.state)
 
 
 def say_in_each_room(row: Builder, said: str, left_out: Sequence[str] = ()) -> None:
@@ -79,7 +76,7 @@ def say_in_each_room(row: Builder, said: str, left_out: Sequence[str] = ()) -> N
     row.insert(Clause("", text) for go in goes for text in (go, said))
 
 
-def _goes_to_listener(row: Builder, to: Match) -> None:
+def goes_to_listener(row: Builder, to: Match) -> None:
     """Adds the drive to the listener."""
     said, place = to["name"] or to["pronoun"], to["where"]
     if not (said or place or to["speaker"]):
@@ -87,8 +84,8 @@ def _goes_to_listener(row: Builder, to: Match) -> None:
     words = "here" if to["speaker"] else " in ".join(filter(None, (said, place)))
     reading = row.reader.go_to(words, row.state, by="come" if to["speaker"] else "go")
     last = row.steps[-1].commands[-1:] if row.steps and not place else ()
-    if any(one.task in PEOPLE_TASKS and str(one.object) == reading.commands[-1].goal for one in last):
-        return  # the robot has just followed or guided that person
+    if any(one.about_person and str(one.object) == reading.commands[-1].goal for one in last):
+        return  # the last task has left the robot with that person
     if reading.commands[-1].goal != row.state.goal or reading.commands[-1].goal_at is not None:
         row.add(reading)
 
@@ -103,12 +100,12 @@ def _parse_speech(text: str, reader: PlainReader) -> Match | None:
     forms = reader.forms("speech")
     clear = forms["say_within"].fullmatch(text) is None
     require(clear, f"I do not understand to whom to say '{text}'; name one person at the end", text)
-    for intent in ("says_to", "greets_there", "says", "formula", "tells", "relays"):
+    for intent in ("says_to", "greets_there", "says", "tells", "relays"):
         if (match := forms[intent].fullmatch(text)) is not None:
             if match["polite"]:
                 _refuse_harm(match["text"], reader)
             return replace(match, slots={**match.slots, "text": _words(match, intent, reader.pipeline.parser)})
-    _refuse_stranger(text, reader.knowledge)
+    refuse_stranger(text, reader.knowledge)
     return None
 
 
@@ -121,7 +118,7 @@ def _refuse_harm(told: str, reader: PlainReader) -> None:
         refuse_harm(predicates(items))
 
 
-def _refuse_stranger(text: str, knowledge: Knowledge) -> None:
+def refuse_stranger(text: str, knowledge: Knowledge) -> None:
     """Raises RefusalError for a listener with an unknown name."""
     match = re.match(r"(?:[Tt]ell|[Aa]sk) (?P<who>[A-Z][a-z]+)\b", text)
     names = knowledge.spellings(knowledge.people)
@@ -134,7 +131,7 @@ def _refuse_stranger(text: str, knowledge: Knowledge) -> None:
 def _words(match: Match, intent: str, parser: DependencyParser) -> str:
     """Words to say; none of "let Robin know it". Raises RefusalError for words that mean something else when said."""
     said = f"{match['polite']}{match['text']}"
-    if intent == "formula" or not said:
+    if not said:
         return said
     clause = intent != "tells" and is_clause(said, parser)
     nothing = SPEECH["nothing"].fullmatch(said) is not None
@@ -172,90 +169,6 @@ def is_clause(text: str, parser: DependencyParser) -> bool:
     return bool(finite) and any(t.relation in ("nsubj", "nsubjpass", "expl") and t.head in verbs for t in tokens)
 
 
-def _escape_braces(text: str) -> str:
+def escape_braces(text: str) -> str:
     """Escapes braces in a text."""
     return text.replace("{", "{{").replace("}", "}}")
-
-
-@dataclass(frozen=True)
-class QuestionRequest:
-    """Question to a person, the objects to choose from (with their articles), and whether its answer is yes or no."""
-
-    text: str
-    of: Match
-    choices: tuple[str, ...]
-    yes_or_no: bool = False
-
-
-def asks(row: Builder, clause: Clause) -> bool:
-    """Adds a question to somebody, with the steps that follow each answer."""
-    person, text = row.state.memory.person, clause.text
-    if person is not None:
-        text = re.sub(r"^(ask) (?:him|her)\b", rf"\1 {person.name}", text, flags=re.IGNORECASE)
-    if (asked := _parse_question(text, row.reader)) is None:
-        return False
-    row.flush()
-    _goes_to_listener(row, asked.of)
-    choices = (_agreed if asked.yes_or_no else _chosen)(row, asked)
-    row.put((Ask(ask=_escape_braces(asked.text), choices=choices),), row.state.elsewhere)
-    return True
-
-
-def _agreed(row: Builder, asked: QuestionRequest) -> dict[str, Steps]:
-    """Steps that follow the answers yes and no."""
-    found: dict[str, Steps] = {"yes": (), "no": ()}
-    while (clause := row.following) is not None:
-        match = CHECKS["answers"].match(clause.text) if clause.kind is Cue.IF else None
-        answer, rest = _ANSWERS.get(clause.kind), clause.text
-        if match is not None:
-            answer, rest = match["answer"], rest[match.end :].strip(" ,")
-        if clause.kind is None and not any(found.values()) and CHECKS["brings_it"].match(rest):
-            answer = "yes"
-        if answer is None or found[answer]:
-            break
-        row.at += 1
-        body = row.body(clause, rest, end_of_scope(row.clauses, row.at, branch=True), clause.text)
-        found[answer] = _steps_if_chosen(row, body, asked, asked.choices[0])
-    clear, ahead = found["yes"] or not begins_as(row.ahead(), "brings"), row.ahead()
-    require(clear, "say 'if yes' before the action for that answer", ahead)
-    return found
-
-
-def _chosen(row: Builder, asked: QuestionRequest) -> dict[str, Steps]:
-    """Steps that follow each of the choices: the robot brings the chosen object if the sentence says so."""
-    body = row.take("", row.at + 1) if begins_as(row.ahead(), "brings") else []
-    steps = {choice: _steps_if_chosen(row, body, asked, choice) if body else () for choice in asked.choices}
-    article = re.compile(r"^(?:a|an|some|the|any|another) ", re.IGNORECASE)
-    return {article.sub("", choice): each for choice, each in steps.items()}
-
-
-def _steps_if_chosen(row: Builder, body: Sequence[Clause], asked: QuestionRequest, choice: str) -> Steps:
-    """Steps after an answer: "it" refers to the chosen object, and the asked person receives it."""
-    objects = tuple(item.phrase for item in row.reader.read_items(choice) if isinstance(item, Chunk))
-    person = named(asked.of["name"])
-    memory = replace(row.state.memory, objects=objects, gathered=objects, where=None, person=person)
-    steps, after = row.nest(body, replace(row.state, memory=memory, recipient=person))
-    row.state = row.state.noting(after.notes)
-    return steps
-
-
-def _parse_question(text: str, reader: PlainReader) -> QuestionRequest | None:
-    """Parses a request to ask somebody a question; None for others. Raises RefusalError for one it cannot put."""
-    forms, knowledge = reader.forms("speech"), reader.knowledge
-    if not re.match(r"ask\b", text, re.IGNORECASE) or forms["tells"].fullmatch(text):
-        return None
-    match = forms["wants_one"].fullmatch(text) or forms["wants_what"].fullmatch(text)
-    if match is None or not match["name"]:
-        _refuse_stranger(text, knowledge)
-        able = "I can ask somebody by name whether they want this or that"
-        raise RefusalError(f"I do not understand the question in '{text}'; {able}", [text])
-    if not match["what"]:  # what he wants to drink: a choice among all known objects of that kind
-        kind = (match["kind"] or match["drink"]).lower()
-        names = knowledge.classes(kind.removesuffix("s")) if kind else ()
-        require(names, f"I do not know what there is to choose from in '{text}'; name it", text)
-        spoken = f"Which {kind} do you want?" if match["kind"] else "What do you want to drink?"
-        return QuestionRequest(spoken, match, tuple(map(with_article, names)))
-    if (word := CLAUSES["deictic"].search(match["what"])) is not None:
-        raise RefusalError(f"I cannot ask that for you: '{word.text}' would mean somebody else", [text])
-    choices = tuple(re.split(r",? or |, ", match["what"], flags=re.IGNORECASE))
-    return QuestionRequest(f"Do you want {match['what']}?", match, choices, yes_or_no=len(choices) == 1)

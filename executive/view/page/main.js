@@ -61,7 +61,7 @@
     const replaying = !timeline.following, view = replaying ? store.at(timeline.t) : store.now, controlState = store.live.control || null;
     meet(store.robots);
     control.meet(store.robots);
-    header.draw(store, view, replaying);
+    header.draw(store, view, replaying, map.map);
     teleop.draw(store.live.teleop, store.live.teleop_keys);
     control.draw(controlState, !panels.size && store.now.outcomes.length > 0);
     verdicts.draw(replaying ? null : store.live.verdict, fileOf);

@@ -5,9 +5,9 @@
   const SEEN_M = 0.05; // a cell
   const PERSON_M = 0.45; // cells so near to a person are the person
   const DASHES = [[5, 4], [2, 3], [9, 4], [9, 3, 2, 3], [1, 4], [14, 4]]; // one for each colour of a robot
-  const RESERVED_PX = 9, FOOT_PX = 30; // the scale stands below the map
+  const RESERVED_PX = 9, POSE_PX = 9, FOOT_PX = 30; // the scale stands below the map
   const LENGTHS_M = [0.5, 1, 2, 5, 10, 20, 50];
-  const DOORS = { closed: ["--closed", 5, []], open: ["--success", 3, [2, 3]], unknown: ["--dim", 3, [1, 4]] };
+  const DOORS = { closed: ["--closed", 5, []], open: ["--open", 3, [2, 3]], unknown: ["--dim", 3, [1, 4]] };
   const OCCUPIED_BELOW = 100, FREE_ABOVE = 230;
 
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -260,7 +260,21 @@
         this.names.keepClear(u, v, 8, true);
         this.names.add("dock", u, v, css("--text"), { room: this.roomAt(at, [u, v]) });
       }
+      for (const { x, y, yaw_rad: yaw } of this.map.places) if (yaw !== undefined) this.drawPose(brush, at(x, y), yaw);
       for (const { name, x, y } of this.map.places) this.names.add(name, ...at(x, y), css("--dim"), { room: this.roomAt(at, at(x, y), name) });
+    }
+
+    // A named pose: a dot, and a line in the direction in which the robot looks there.
+    drawPose(brush, [u, v], yaw) {
+      brush.strokeStyle = brush.fillStyle = css("--dim");
+      brush.lineWidth = 2;
+      brush.beginPath();
+      brush.moveTo(u, v); brush.lineTo(u + POSE_PX * Math.cos(yaw), v - POSE_PX * Math.sin(yaw));
+      brush.stroke();
+      brush.beginPath();
+      brush.arc(u, v, 3, 0, 2 * Math.PI);
+      brush.fill();
+      this.names.keepClear(u, v, 5, true);
     }
 
     // The outline of the room of a name, else of the room at a point; null in logs that have no outlines.

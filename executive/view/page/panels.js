@@ -93,16 +93,18 @@
   }
 
   class Header {
-    draw(store, view, replaying) {
+    // Where a robot is driven by hand, there is no run, and its map names the world.
+    draw(store, view, replaying, map) {
       const tree = view.trees[view.trees.length - 1], several = store.robots.length > 1, driven = store.live.teleop;
       const mission = !tree ? (driven ? `${driven.robot}, by hand` : "Errand") : several ? store.robots.join(", ") : missionOf(tree.root).name;
       byId("title").textContent = tree && !several ? `${tree.robot}: ${mission}` : mission;
       document.title = tree ? `${mission} – Errand` : "Errand";
       byId("clock").textContent = `${(replaying ? view.t : store.end).toFixed(1)} s`;
       byId("late").textContent = view.late;
-      if (store.run) {
-        byId("world").textContent = store.run.world;
-        byId("seed").textContent = store.run.seed;
+      const told = { world: (store.run || map || {}).world, seed: (store.run || {}).seed };
+      for (const [id, value] of Object.entries(told)) {
+        byId(id).textContent = value;
+        byId(id).parentElement.hidden = value === undefined;
       }
     }
   }
@@ -195,7 +197,7 @@
   }
 
   // The scene while it runs, or its recording, which follows the slider.
-  const EASY_PERIOD_MS = 700, BESIDE_M = [-0.4, 3.6, 1.0]; // steep, so that it looks over a wall half a metre behind the robot
+  const EASY_PERIOD_MS = 700, BESIDE_M = [-1.0, 3.1, 2.2]; // so high that it looks over a cut wall half a metre behind the robot
 
   class ScenePanel {
     constructor(box, follow) {

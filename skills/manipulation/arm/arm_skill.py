@@ -14,10 +14,17 @@ from skills.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.forces import hand_force_n, held_mass_kg
 from skills.manipulation.arm.kinematics import ArmModel, arm_model
-from skills.manipulation.arm.motion import GripperTurn
+from skills.manipulation.arm.motion import ArmPlanner, GripperTurn
 from skills.manipulation.arm.poses import carry_configuration, hangs_below
 from skills.manipulation.arm.solid_cells import Outline, OwnSpace, column_boxes, hidden_boxes, solid_boxes
-from skills.robot import ArmCapabilities, ArmTrajectory, CommandId, FloatArray, GripperCapabilities, GripperKind
+from skills.robot import (
+    ArmCapabilities,
+    ArmTrajectory,
+    CommandId,
+    FloatArray,
+    GripperCapabilities,
+    GripperKind,
+)
 from skills.routine import PlanningAttempt, Routine, RoutineSkill, SkillFailure
 
 Goal = Callable[[ArmScene, FloatArray], FloatArray]
@@ -331,7 +338,7 @@ class ArmSkill(RoutineSkill[InputsT]):
             scene = None if scene_now is None else scene_now()
             if scene is not None:
                 scene.set_padding(0.0)
-            planner = self.context.stack.arm_planner
+            planner: ArmPlanner = self.context.stack.arm_planner
             return planner.trajectory(planner.line(self.model, q, X_BH, scene), speed_rad_s=LINE_SPEED_RAD_S)
 
         trajectory = yield from self.compute(plan, latency_s=0.1, name="plan straight line", message=message)

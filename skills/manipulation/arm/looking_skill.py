@@ -15,11 +15,12 @@ from skills.api import Cause, InputsT, PlanningError
 from skills.estimate.scan_points import segment_distance
 from skills.manipulation.arm.arm_skill import ArmSkill, Goal
 from skills.manipulation.arm.collision import ArmScene
+from skills.manipulation.arm.kinematics import arm_model
 from skills.manipulation.arm.poses import look_configuration
 from skills.manipulation.arm.solid_cells import add_picture, add_view
 from skills.perception.detector.camera_images import fresh_image, is_dark, lacks_depth
 from skills.perception.point_cloud import APART_S, is_at_rest
-from skills.robot import CameraCapabilities, FloatArray, HeadCapabilities, Image, Mount
+from skills.robot import CameraCapabilities, Capabilities, FloatArray, HeadCapabilities, Image, Mount
 from skills.routine import PATIENCE_S, Routine, SkillFailure
 
 PICTURE_LATENCY_S = 0.1
@@ -50,6 +51,23 @@ _HELD_RADIUS_M = 0.2
 
 class LookingSkill(ArmSkill[InputsT]):
     """Routine that points the object camera, takes pictures and compares them."""
+
+    @classmethod
+    def reached_heights_m(cls, capabilities: Capabilities) -> tuple[float, float]:
+        """Heights above the floor of the lowest and the highest surface that the arm reaches.
+
+        They depend on the arm's length, the range of body heights, and the nearest standing distance.
+        """
+        try:
+            model, arm = arm_model(capabilities), capabilities.arm
+        except ValueError:
+            return super().reached_heights_m(capabilities)
+        assert arm is not None
+        x_m, _, z_m = model.p_BS
+        ahead_m = max(0.0, min(*arm.standing_m, *arm.nearer_m) - float(x_m))
+        upright_m = math.sqrt(max(0.0, arm.max_reach_m**2 - ahead_m**2))
+        low_m, high_m = capabilities.height_range_m
+        return low_m + float(z_m) - upright_m, high_m + float(z_m) + upright_m
 
     @property
     def object_camera(self) -> CameraCapabilities:

@@ -4,24 +4,22 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, pairwise
-from typing import Final
+from typing import Any, Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from skills.compiled import compiled
 from skills.estimate.scan_points import segment_distance
-from skills.geometry import grid_inside, inside_polygon
-from skills.grid_map import GridMap
-from skills.manipulation.arm.collision import Box
-from skills.perception.point_cloud import MIN_DEPTH_M, camera_pose_W, distinct_cells, lens_rays
-from skills.robot import FloatArray, Image, Intrinsics
-from skills.world_model import Surface
+from skills.grid_map import CELL_M, LEVELS, Cells
+from skills.inputs.plugins import installed_plugins
+from skills.manipulation.arm.collision import ArmScene, Box, gaps_m
+from skills.manipulation.arm.kinematics import arm_model
+from skills.perception.point_cloud import MIN_DEPTH_M, camera_pose_W, lens_rays
+from skills.robot import FloatArray, FrameTree, Image, Intrinsics
 
-CELL_M: Final = 0.04
-"""Side of a cell."""
+_SEVEN_JOINTS: Final = "fetch"
 _NEAREST_M = 0.28
 """Distance from the camera below which depth is not used."""
 _FURTHEST_M = 2.5
@@ -46,18 +44,7 @@ _AT_ARM_M = 0.12
 """Solid cells nearer to the arm's axis than this are the arm itself."""
 _AT_HELD_M = 0.05
 """Distance from the held object within which solid cells are the object itself, or in contact with it."""
-_AGREE_M = 0.03
-"""Noise of the grids: distance within which an occupied cell of one counts as occupied in another."""
-_AT_SURFACE_M = 0.06
-"""Distance from a surveyed surface within which occupied cells are its edge."""
-_FEWEST_COLUMNS = 8
-"""Number of connected columns from which on they are a wall."""
-_LEVELS = np.arange(round(0.08 / CELL_M), round(2.0 / CELL_M))
-"""Levels of the cells of a column, from just above the floor to above the arm."""
-_BELOW_TOP_M = 0.01
-"""Distance from a surveyed surface down to the solid below it."""
 
-Cells = NDArray[np.int64]
 View = tuple[Image, RigidTransform]
 """Depth picture, and the X_WO of its time."""
 
@@ -191,46 +178,13 @@ def boxes_around(cells: Cells, X_WB: RigidTransform, chosen: Callable[[FloatArra
     return [_box(low, high, X_BW) for low, high in merge_cells(cells[chosen(cell_centres(cells))])]
 
 
-def map_columns(grids: Sequence[GridMap], surfaces: Sequence[Surface]) -> Cells:
-    """Columns (N, 3) of solid cells, x, y and one past the highest level: walls, and all below a lowest surface."""
-    walls = wall_columns(grids, surfaces)
-    columns = [np.insert(walls, 2, _LEVELS[-1] + 1, axis=1)]
-    for surface in sorted(surfaces, key=lambda surface: surface.height_m):
-        below = np.floor(grid_inside(surface.polygon_W, CELL_M, margin_m=1e-6) / CELL_M).astype(np.int64)
-        columns.append(np.insert(below, 2, math.floor((surface.height_m - _BELOW_TOP_M) / CELL_M), axis=1))
-    every = np.vstack(columns)
-    return every[np.sort(np.unique(every[:, :2], axis=0, return_index=True)[1])]
-
-
-def wall_columns(grids: Sequence[GridMap], surfaces: Iterable[Surface]) -> Cells:
-    """Columns (N, 2) of cells that are occupied in all grids of a map, and thus solid at all their heights.
-
-    A grid has no heights, and a LiDAR's band shows table tops and their edges. So the columns exclude surveyed
-    surfaces, over which the arm reaches, and single posts, such as chair legs.
-    """
-    first, *others = sorted(grids, key=lambda grid: np.count_nonzero(grid.occupied))
-    points_W = first.centres(np.argwhere(first.occupied))
-    for grid in others:
-        points_W = points_W[grid.distance_m(points_W) < _AGREE_M]
-    for surface in surfaces:
-        points_W = points_W[~inside_polygon(points_W, surface.polygon_W, _AT_SURFACE_M)]
-    columns = distinct_cells(np.floor(points_W / CELL_M).astype(np.int64))
-    if len(columns) == 0:
-        return columns
-    low = columns.min(axis=0)
-    picture = np.zeros(columns.max(axis=0) - low + 1, dtype=np.uint8)
-    picture[tuple((columns - low).T)] = 1
-    _, parts, about, _ = cv2.connectedComponentsWithStats(picture)
-    return np.asarray(np.argwhere((parts > 0) & (about[parts, cv2.CC_STAT_AREA] >= _FEWEST_COLUMNS)) + low)
-
-
 def column_boxes(
     columns: Cells, X_WB: RigidTransform, reach_m: float, left_out: Callable[[FloatArray], NDArray[np.bool_]]
 ) -> list[Box]:
     """Boxes in the body frame around the solid columns within reach, except cells for which `left_out` is true."""
     off_m = (columns[:, :2] + 0.5) * CELL_M - X_WB.translation()[:2]
     near = columns[np.linalg.norm(off_m, axis=1) < reach_m]
-    cells = np.column_stack([np.repeat(near, len(_LEVELS), axis=0), np.tile(_LEVELS, len(near))])
+    cells = np.column_stack([np.repeat(near, len(LEVELS), axis=0), np.tile(LEVELS, len(near))])
     cells = cells[cells[:, 3] < cells[:, 2]][:, [0, 1, 3]]
     return boxes_around(cells, X_WB, lambda p_W: ~left_out(p_W))
 
@@ -331,3 +285,26 @@ def _joined(boxes: Cells, axis: int, others: Sequence[int]) -> Cells:
 def _box(low: Cells, high: Cells, X_BW: RigidTransform) -> Box:
     x, y, z = (high - low) * CELL_M
     return Box(X_BW @ RigidTransform(0.5 * (low + high) * CELL_M), (float(x), float(y), float(z)))
+
+
+def solve_arm() -> None:
+    """Solves the inverse kinematics of an arm with seven joints, and checks it for collisions with a box."""
+    (kind,) = installed_plugins("errand.robots").select(name=_SEVEN_JOINTS)
+    robot_kind: Any = kind.load()
+    capabilities = robot_kind.capabilities()
+    model = arm_model(capabilities)
+    q_rad = np.full(7, 0.5)
+    model.inverse(model.X_BH(q_rad))
+    scene, box = ArmScene(capabilities, model, {}), Box(RigidTransform([2.0, 0.0, 0.0]), (0.1, 0.1, 0.1))
+    scene.set_boxes([box])
+    scene.edge_free(q_rad, q_rad)
+    gaps_m(box, [box], np.zeros((1, 3)))
+
+
+def map_cells() -> None:
+    """Adds a depth picture to the arm's occupied cells."""
+    lens, depth_m = Intrinsics(2, 2, 1.0, 1.0, 1.0, 1.0), np.ones((2, 2), dtype=np.float32)
+    image = Image(0.0, "hand", "odom", lens, lens, None, np.zeros((2, 2), dtype=np.uint8), depth_m, FrameTree({}))
+    own = Outline(RigidTransform(), np.zeros(2), np.zeros(2))
+    add_picture(np.empty((0, 3), dtype=np.int64), image, RigidTransform(), own)
+    segment_distance(np.ones((3, 2)).T, np.zeros(3), np.ones(3))

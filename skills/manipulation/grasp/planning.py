@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -262,3 +263,24 @@ def pull_back_B(X_BH: RigidTransform, p_BS: FloatArray) -> FloatArray:
     if np.linalg.norm(against) < _LEVEL:
         against = (p_BS - X_BH.translation()) * [1.0, 1.0, 0.0]
     return np.asarray(against / np.linalg.norm(against))
+
+
+class GraspPlanner(Protocol):
+    """Plans grasps and the motions to them."""
+
+    def candidates(self, target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> list[GraspCandidate]:
+        """Returns grasp candidates, the best first; an empty list for an object that is too wide or too flat.
+
+        `p_BS` is the position of the shoulder.
+        """
+
+    def plan(
+        self,
+        scene: ArmScene,
+        q_start_rad: FloatArray,
+        candidates: Sequence[GraspCandidate],
+        around: Surroundings,
+        arm_planner: ArmPlanner,
+        rng: np.random.Generator,
+    ) -> GraspPlan:
+        """Plans the best feasible candidate. Raises PlanningError when none is feasible."""

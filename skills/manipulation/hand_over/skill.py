@@ -23,6 +23,7 @@ from skills.perception.people import SeenPerson, people_in_scan
 from skills.quantities import Duration, Force, Height, Length
 from skills.robot import FloatArray
 from skills.routine import Patience, Routine, SkillFailure
+from skills.world_model import PERSON
 
 _FACING_RAD = 0.5
 """Largest bearing of a person who is ahead."""
@@ -44,10 +45,14 @@ _HOLD_OUT_RAD_S = 0.8
 
 @dataclass(frozen=True)
 class HandOverInputs:
-    """Names of the person and of the object, for messages; the skill chooses the nearest person in sight."""
+    """Names of the person and of the object, for messages; the skill chooses the nearest person in sight.
+
+    `met`: the robot has just met the person, so that its result need not say that it takes somebody for them.
+    """
 
     person: str
     thing: str = "object"
+    met: bool = False
 
 
 @dataclass(frozen=True)
@@ -147,7 +152,8 @@ class HandOver(HandOverVerification[HandOverInputs]):
         }
         if seen in why:
             raise SkillFailure(Cause.POSTCONDITION, why[seen])
-        return Succeeded(f"gave the {name} to {person}")
+        whom = person if inputs.met or person in ("somebody", PERSON) else f"somebody, taken for {person}"
+        return Succeeded(f"gave the {name} to {whom}")
 
     def _pulled(self, inputs: HandOverInputs) -> Routine[bool]:
         """Waits for a pull at the object or the operator's answer; returns False when `wait_s` is over.

@@ -12,7 +12,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import PlanningError, Surface
-from skills.geometry import grid_inside, inside_polygon
+from skills.geometry import SPOT_EDGE_M, grid_inside, inside_polygon, surface_spots
 from skills.inputs.errors import listing
 from skills.manipulation.arm.arm_skill import Goal
 from skills.manipulation.arm.collision import ArmScene, Box
@@ -32,13 +32,8 @@ if TYPE_CHECKING:
 
 CLEARANCE_M = 0.12
 """Distance of a comfortable spot from the objects on the surface."""
-EDGE_M = 0.09
-"""Distance of a comfortable spot from the edges of the surface."""
 BESIDE_M = 0.03
 """Least gap between the object's outline and others, and the surface's edge."""
-_GRID_M = 0.04
-"""Distance between spots."""
-_ROUNDING_M = 1e-6
 _SEEN_WITHIN_M = 0.04
 """Radius around a spot in which the surface must be seen."""
 _LEAST_SEEN = 15
@@ -67,12 +62,6 @@ _SURE_M = 0.02
 """Margin of a spot's relations, for the way the object takes when it is put down."""
 _OVER_M = 0.1
 """Distance beyond a surface's edge within which an object counts as over the surface."""
-
-
-def spots(surface: Surface, edge_m: float = EDGE_M) -> FloatArray:
-    """Points (N, 2) on a surface at least edge_m from its edges; its centre when it is small."""
-    inside = grid_inside(surface.polygon_W, _GRID_M, first_m=edge_m, margin_m=_ROUNDING_M - edge_m)
-    return inside if len(inside) else np.asarray([np.mean(surface.polygon_W, axis=0)])
 
 
 def clear_spots(candidates: FloatArray, circles_W: Sequence[tuple[float, float, float]]) -> FloatArray:
@@ -215,8 +204,8 @@ class SpotSearch:
         """Spots (N, 2) on the surface, free or not; of a bin its middle."""
         if self.surface.is_bin:
             return np.asarray([np.mean(self.surface.polygon_W, axis=0)])
-        edge_m = min(EDGE_M, self.held.half_width_m + BESIDE_M) if self.tight else EDGE_M
-        found = clear_spots(spots(self.surface, edge_m), self.clear_of)
+        edge_m = min(SPOT_EDGE_M, self.held.half_width_m + BESIDE_M) if self.tight else SPOT_EDGE_M
+        found = clear_spots(surface_spots(self.surface.polygon_W, edge_m), self.clear_of)
         if not self.relations or self.missing():
             return found
         scene = Scene(self.surface.polygon_W, self.surface.viewer or self.robot, self._seen)

@@ -23,7 +23,6 @@ from skills.manipulation.arm.looking_skill import PICTURE_LATENCY_S
 from skills.manipulation.arm.poses import UP_B, finger_sweep_m, tucked_configuration
 from skills.manipulation.arm.solid_cells import cell_centres
 from skills.manipulation.grasp.reach import body_heights_m
-from skills.manipulation.place.bin import BinPlacement
 from skills.manipulation.place.free_spots import (
     PrePlacePose,
     SpotSearch,
@@ -37,6 +36,7 @@ from skills.manipulation.place.free_spots import (
     spaced_spots,
     unseen_view,
 )
+from skills.manipulation.place.verification import BinPlacement
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.surroundings import NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, segment_surface

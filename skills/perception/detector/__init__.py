@@ -34,6 +34,13 @@ class Cascade:
         cascade = _LoadedWhenUsed(self)
         return with_models(cascade if self.file is None else cascade.loaded(), self.objects)
 
+    def build_for_pictures(self, threshold: float) -> Detector:
+        """Loads the networks for single pictures. Raises InputError if the file is unusable."""
+        from skills.perception.detector.model_files import MODEL_FILE
+        from skills.perception.detector.onnx_detector import DetectorOptions, load_detector
+
+        return load_detector(self.file or MODEL_FILE, DetectorOptions(threshold=threshold))
+
 
 @dataclass(frozen=True)
 class _LoadedWhenUsed(DetectorWrapper):

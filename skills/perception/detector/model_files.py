@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -25,7 +26,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from skills.inputs.errors import InputError
-from skills.inputs.outside import read_bytes
+from skills.inputs.outside import is_file, read_bytes
 from skills.perception.detector.boxes import HEIGHT_PX, WIDTH_PX
 
 if TYPE_CHECKING:
@@ -42,6 +43,8 @@ _SEAL_HEAD: Final = b"\x72\x4a\x0a\x06" + _SEAL_KEY + b"\x12\x40"
 _SEAL_LENGTH: Final = len(_SEAL_HEAD) + 64
 _CPU_INFO: Final = Path("/proc/cpuinfo")
 _VNNI: Final = frozenset({"avx512_vnni", "avx_vnni"})
+_WEIGHTS_IN: Final = re.compile(rb"\n\x08location\x12(.)", re.DOTALL)
+"""Key, and length of the value, before the name of a file with weights, in the encoding of Protocol Buffers."""
 _NUMPY: Final = {"uint8": np.uint8, "float": np.float32}
 
 Inputs = Mapping[str, tuple[str, tuple[int, ...]]]
@@ -162,7 +165,11 @@ def load_network(file: Path, kind: NetworkKind) -> Network:
 def open_session(file: Path) -> onnxruntime.InferenceSession:
     """Opens a network that another tool exported, with weights in files beside it. Raises ModelFileError."""
     reader = _Reader(file, _EXPORTED)
-    reader.content()
+    content = reader.content()
+    for found in re.finditer(_WEIGHTS_IN, content):
+        name = content[found.end() : found.end() + found[1][0]].decode(errors="replace")
+        if not is_file(file.parent / name):
+            raise ModelFileError(f"its weights are in {name}, which is missing", hint="copy it along", file=file)
     return reader.session(str(file))
 
 
@@ -212,6 +219,9 @@ class _Reader:
             return onnxruntime.InferenceSession(content, _session_options(), providers=["CPUExecutionProvider"])
         except Exception as error:  # the library's errors have no common class
             reason = str(error).splitlines()[0][:120]
+            if self.kind is _EXPORTED and "PROTOBUF" not in reason:
+                hint = "export it again, for ONNX Runtime and without operations of other runtimes"
+                raise ModelFileError(f"ONNX Runtime cannot run it ({reason})", hint=hint, file=self.file) from error
             raise self.error(f"the model of the detector is damaged or no ONNX file ({reason})") from error
 
     def check_format(self, metadata: Mapping[str, str]) -> None:
@@ -225,7 +235,7 @@ class _Reader:
         """Reads the class names from the metadata."""
         try:
             names = json.loads(metadata.get("class_names", ""))
-        except ValueError:
+        except (ValueError, RecursionError):
             names = None
         if not isinstance(names, list) or not names or not all(isinstance(name, str) and name for name in names):
             raise self.error("the model has no list of class names")

@@ -3,7 +3,7 @@
 import random
 from dataclasses import dataclass
 
-from executive.words.command import Task
+from executive.words.task import task_named
 from tests.tables import yaml_beside
 
 PATTERNS = yaml_beside(__file__, "patterns.yaml")
@@ -87,7 +87,7 @@ class _Maker:
 
     def _find(self):
         (thing, name), (words, place) = self._thing(), self._maybe(" in the {}", rooms=True)
-        found = place or self._usual(name, Task.FIND)
+        found = place or self._usual(name, "find")
         return self._text("find", thing, place=words), [f"Take [Nothing] to [{found}] and do [find] to [{name}]"]
 
     def _pick(self):
@@ -134,8 +134,8 @@ class _Maker:
         name, known = self._room() if rooms or self.draw.random() < 0.3 else self._surface()
         return pattern.format(name), known
 
-    def _usual(self, name, task=Task.GRASP):
-        return self.knowledge.default_place(task, name)
+    def _usual(self, name, task="grasp"):
+        return self.knowledge.default_place(task_named(task), name)
 
 
 def _named(group):

@@ -3,13 +3,12 @@
 import os
 import subprocess
 import sys
-from importlib.metadata import entry_points
 
 import pytest
 
 from executive.app.kernels import kernel_steps
 from skills.inputs.errors import InputError
-from tests.executive.distribution import write_distribution
+from tests.executive.distribution import module_of_a_plug_in
 
 SAILS = """
 import numba
@@ -29,11 +28,8 @@ def torn():
 @pytest.fixture
 def install(tmp_path, monkeypatch):
     """Makes a distribution that registers kernels."""
-    (tmp_path / "sails.py").write_text(SAILS)
-    monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr("skills.inputs.plugins._all_installed", entry_points)
-    yield lambda *kernels: write_distribution(tmp_path, "sails", "errand.kernels", *kernels)
-    sys.modules.pop("sails", None)
+    with module_of_a_plug_in(tmp_path, monkeypatch, "sails", "errand.kernels", SAILS) as register:
+        yield register
 
 
 def sails():

@@ -107,7 +107,7 @@ def places():
 def commands():
     """All commands by the words that call them."""
     top = {name: entry.shipped_command(name) for name in entry.COMMANDS}
-    top |= {name.replace(".", " "): entry.plugin_command(name) for name in entry.PLUGIN_COMMANDS}
+    top |= {name.replace(".", " "): entry.plugin_command(name) for name in entry.help_lines()}
     return {" ".join(words): found for name, each in top.items() for words, found in _below((name,), each)}
 
 

@@ -12,6 +12,7 @@ from executive.app.prepare import checker
 from executive.mission.request import Request
 from tests.executive.cli.calls import errand, json_of
 from tests.executive.distribution import write_distribution
+from tests.skills.exported_networks import mean_colour
 
 ROOT = Path(__file__).parents[3]
 GOOD = ROOT / "missions" / "go_living_room.yaml"
@@ -76,7 +77,7 @@ def test_json_is_one_object_for_all_files(write):
     result = check(GOOD, bad, "--json")
     assert result.exit_code == 2
     told = json_of(result)
-    assert set(told) == {"ok", "errors", "warnings", "nodes", "commands", "estimates"}
+    assert set(told) == {"ok", "errors", "warnings", "detectors", "nodes", "commands", "estimates"}
     assert [one["file"] for one in told["estimates"]] == [str(GOOD)]
     assert told["ok"] is False
     assert told["nodes"] > 3
@@ -98,6 +99,15 @@ def test_paths_are_planned_with_the_planner_of_a_stack_file(write):
     assert [json_of(check(file, "--json"))["ok"] for file in (GOOD, mission)] == [True, True]
     (error,) = json_of(check(mission, "--json", "--stack", wide))["errors"]
     assert (error["file"], error["line"]) == (str(mission), 3)
+
+
+def test_the_detector_of_a_stack_file_is_tried_and_described(write, tmp_path):
+    mean_colour(tmp_path / "own.onnx")
+    mission = write("name: x\nsteps:\n  - {to: kitchen}\n")
+    stack = write("detector: {use: onnx, file: own.onnx, classes: {red: beer}}\n", "stack.yaml")
+    assert "detector: Ultralytics YOLO" in check(mission, "--stack", stack).stdout
+    (about,) = json_of(check(mission, "--json", "--stack", stack))["detectors"]
+    assert "labels 0 red (beer), 1 green, 2 blue" in about
 
 
 def test_a_broken_plug_in_fails_only_the_file_that_uses_it(write, tmp_path):
@@ -156,6 +166,12 @@ def test_a_range_of_time_is_printed_with_its_reason_and_stands_in_the_json(write
     (estimate,) = json_of(check(file, "--json"))["estimates"]
     assert (estimate["least_s"], estimate["most_s"], estimate["reasons"]) == (0.0, 86400.0, ["until 18:00"])
     assert "0 s to 24 h 00 min (until 18:00)" in " ".join(check(file).stdout.split())
+
+
+def test_a_time_of_day_sets_the_limit_of_a_wait(write):
+    file = write('name: wait\nworld: flat\nsteps:\n  - wait: {until_clock: "18:00"}\n')
+    (estimate,) = json_of(check(file, "--time-of-day", "17:00", "--json"))["estimates"]
+    assert estimate["time_limit_s"] == 1200.0 + 3600.0
 
 
 def test_check_says_when_the_time_limit_ends_a_run(write):

@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from executive.cli.defaults import default_map
 from executive.cli.options import StartCommand, takes_request
+from skills.inputs.errors import InputError
 
 MISSION = "name: there\n{more}steps:\n  - to: hall\n"
 
@@ -32,6 +33,13 @@ def request_of(tmp_path, monkeypatch):
         return made.request
 
     return call
+
+
+@pytest.mark.parametrize("text", ["a = " + "[" * 5000, "a = " + "{a = " * 5000, "a = " + "9" * 5000])
+def test_a_file_that_cannot_be_parsed_is_named(tmp_path, text):
+    (tmp_path / "errand.toml").write_text(text)
+    with pytest.raises(InputError, match=r"errand.toml: .*; correct it there$"):
+        default_map(tmp_path)
 
 
 def test_defaults_count_for_a_sentence_and_what_is_typed_counts_more(request_of, tmp_path):

@@ -123,3 +123,4 @@ def test_an_exported_network_and_a_stack_file_that_names_it_are_taken(tmp_path):
         result = errand("detect", "--model", tmp_path / model, red, "--json")
         (found,) = json_of(result)
         assert [one["class"] for one in found["detections"]] == [name]
+        assert errand("detect", "--model", tmp_path / model, red).stdout.startswith("detector: Ultralytics YOLO")

@@ -22,7 +22,7 @@ from tests.tables import yaml_beside
 GOLDEN: dict[str, Any] = yaml_beside(__file__, "request_options.yaml")
 NOT_OF_THE_REQUEST = {
     *("--listen", "--json", "--quiet", "--tree", "--profile", "--store", "--anyway", "--voice"),
-    *("--view", "--view-port", "--view-host", "--foxglove", "--observe", "--ros2", "--help"),
+    *("--view", "--view-port", "--view-host", "--observe", "--help"),
     "--robot",
 }
 
@@ -85,23 +85,6 @@ def test_three_numbers_after_start_are_one_value():
 
 
 @pytest.mark.parametrize(
-    ("words", "address"),
-    [
-        (["--foxglove"], "127.0.0.1:8765"),
-        (["--foxglove", "--quiet"], "127.0.0.1:8765"),
-        (["--foxglove", "patrol"], "127.0.0.1:8765"),
-        (["--foxglove", "my/patrol.yaml"], "127.0.0.1:8765"),
-        (["--foxglove", "0.0.0.0:9000", "patrol"], "0.0.0.0:9000"),
-        (["--foxglove", "[::1]:9000"], "[::1]:9000"),
-        (["--foxglove", "host:x"], "host:x"),
-    ],
-)
-def test_foxglove_takes_an_address_or_the_usual_one(words, address):
-    given = words[1:2] == [address]
-    assert join_values(words) == [f"--foxglove={address}", *words[2 if given else 1 :]]
-
-
-@pytest.mark.parametrize(
     ("words", "joined"),
     [
         (["--ros2"], ["--observe=ros2="]),
@@ -109,7 +92,11 @@ def test_foxglove_takes_an_address_or_the_usual_one(words, address):
         (["--ros2", "@:7448"], ["--observe=ros2=@:7448"]),
         (["--ros2", "patrol"], ["--observe=ros2=", "patrol"]),
         (["--ros2", "--quiet"], ["--observe=ros2=", "--quiet"]),
+        (["--foxglove", "my/patrol.yaml"], ["--observe=foxglove=", "my/patrol.yaml"]),
+        (["--foxglove", "0.0.0.0:9000", "patrol"], ["--observe=foxglove=0.0.0.0:9000", "patrol"]),
+        (["--foxglove", "[::1]:9000"], ["--observe=foxglove=[::1]:9000"]),
+        (["--foxglove=host:x"], ["--observe=foxglove=host:x"]),
     ],
 )
-def test_ros2_is_short_for_its_observer(words, joined):
+def test_a_name_with_dashes_is_short_for_its_observer(words, joined):
     assert join_values(words) == joined

@@ -1,14 +1,20 @@
 """What becomes of errors on the command line: one line, exit status 2."""
 
+import errno
 import io
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
-import typer
 from rich.console import Console
 
 from executive.cli.output import progress_bar, refuse
 from skills.inputs.errors import InputError, Problems
 from tests.executive.cli.calls import errand
+
+ERRAND = [sys.executable, "-m", "executive.cli"]
+_GONE = "errand: the folder in which it was called is removed; go to another one by cd\n"
 
 
 @pytest.mark.parametrize("option", ["--out", "--store", "--stack", "--world", ""])
@@ -26,7 +32,7 @@ def test_of_many_errors_the_first_are_shown_and_the_rest_counted(capsys):
         problems.add(InputError(f"wrong {number}"))
     with pytest.raises(InputError) as caught:
         problems.raise_any()
-    with pytest.raises(typer.Exit):
+    with pytest.raises(SystemExit):
         refuse(caught.value)
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) < 100
@@ -43,9 +49,44 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path, capsys):
     (tmp_path / "file").write_text("")
     with pytest.raises(NotADirectoryError) as found:
         (tmp_path / "file" / "below").mkdir()
-    with pytest.raises(typer.Exit):
+    with pytest.raises(SystemExit):
         refuse(found.value)
     assert "file/below: cannot use it (Not a directory); name another" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EFBIG, errno.EMFILE])
+def test_a_lack_of_the_machine_is_one_line_that_says_what_is_lost(number, capsys):
+    with pytest.raises(SystemExit) as ended:
+        refuse(OSError(number, "no"))
+    line = capsys.readouterr().err
+    assert (ended.value.code, line.count("\n")) == (2, 1)
+    assert "what this command was writing is lost or incomplete; make room" in line
+
+
+@pytest.mark.parametrize("words", [["--version"], ["--help"], ["missions"], ["parse", "go to the kitchen", "--json"]])
+def test_a_result_that_cannot_be_written_is_one_line(words):
+    with Path("/dev/full").open("w") as full:
+        ended = subprocess.run([*ERRAND, *words], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert (ended.returncode, ended.stderr.splitlines()[-1][:24]) == (2, "errand: the disk is full")
+    assert "Traceback" not in ended.stderr
+
+
+def test_a_process_says_that_its_folder_is_removed(tmp_path):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    script = f'cd {gone} && rmdir {gone} && exec "$@"'
+    called = ["sh", "-c", script, "sh", *ERRAND, "parse", "go to the kitchen"]
+    ended = subprocess.run(called, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (2, _GONE)
+
+
+@pytest.mark.parametrize("words", [["run", "--say", "go"], ["queue", "list"], ["check", "patrol"], ["doctor"]])
+def test_every_command_says_that_its_folder_is_removed(tmp_path, monkeypatch, words):
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    result = errand(*words)
+    assert (result.exit_code, result.stderr) == (2, _GONE)
 
 
 @pytest.fixture

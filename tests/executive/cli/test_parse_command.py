@@ -1,3 +1,4 @@
+import pytest
 import yaml
 
 from tests.executive.cli.calls import done, errand, json_of
@@ -29,6 +30,21 @@ def test_explain_of_a_refusal_names_the_step_and_the_part():
 
 def test_without_explain_there_are_no_steps():
     assert "steps" not in json_of(errand(*OPEN, SENTENCE, "--json"))
+
+
+@pytest.mark.parametrize(
+    ("sentence", "reason"),
+    [
+        ("wait for 25 hours", "a wait lasts a day at most"),
+        ("if there is a beer in the kitchen, wait for 30 hours", "a wait lasts a day at most"),
+        ("take 500 beers to the hall", "500 of 'beer' are too many trips"),
+    ],
+)
+def test_parse_refuses_a_number_in_the_words_of_run(sentence, reason):
+    refused = errand("parse", sentence, "--json")
+    assert (refused.exit_code, json_of(refused)["status"], json_of(refused)["commands"]) == (2, "refused", [])
+    assert json_of(refused)["reason"].startswith(reason)
+    assert f"errand: {json_of(refused)['reason']}" in errand("run", "--say", sentence).stderr
 
 
 DECIDES = "if there is a beer in the kitchen, tell Robin"

@@ -65,6 +65,49 @@ def test_unusable_entries_are_listed_with_their_reasons(ended):
     assert [entry for entry, why in UNUSABLE.items() if why not in told[entry]] == []
 
 
+PAGES = """
+from tests.executive.house_tasks import Call, Vacuum
+
+class Mop(Vacuum):
+    '''Mops a floor.'''
+    word = "mop"
+    sentences = ({"template": "mop {place:where}", "samples": ["mop the hall"]},)
+
+class Sing(Call):
+    '''Calls out what is announced.'''
+    word = "sing"
+    sentences = ({"template": "(sing|announce) {text:object}", "samples": ["sing la la la"]},)
+
+class Take(Call):
+    '''Takes all that is said.'''
+    word = "take"
+    sentences = ({"template": "{text:object}", "samples": ["anything"]},)
+"""
+# what is wrong with a task; None: nothing
+TASKS = {
+    "mop": "the template 'mop {place:where}': the task has no part 'where' for a slot",
+    "sing": "'announce to everybody that dinner is ready', a sentence of Errand itself, is also one of task 'sing' of",
+    "take": "the template '{text:object}': it begins with no certain words",
+    "vacuum": None,
+}
+
+
+def test_faults_of_tasks_are_listed_beside_tasks_without_any(tmp_path):
+    lines = (f"{word} = house_pages:{word.title()}" for word in TASKS)
+    write_distribution(tmp_path, "house", "errand.tasks", *lines)
+    (tmp_path / "house_pages.py").write_text(PAGES)
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
+    command = [sys.executable, "-m", "executive.cli", "plugins"]
+    ended = subprocess.run([*command, "--json"], env=environment, capture_output=True, text=True, check=False)
+    told = {each["name"]: each["broken"] for each in json_of(ended)["plugins"] if each["distribution"] == "house"}
+    assert [
+        word
+        for word, why in TASKS.items()
+        if (why is None) != (told[word] is None) or (why or "") not in str(told[word])
+    ] == []
+    assert ended.returncode == 1
+
+
 def test_a_command_imports_no_plug_in_that_it_does_not_use(site, monkeypatch, tmp_path):
     monkeypatch.syspath_prepend(str(site))
     monkeypatch.setattr("skills.inputs.plugins._all_installed", entry_points)

@@ -14,6 +14,7 @@ from rich.console import Console
 
 from executive.app.report.run_report import RunReport
 from executive.app.runs.one_run import FinishedRun
+from executive.app.runs.page_view import PageView
 from executive.run.visitor import TickNote
 from executive.store.missions import MissionStore
 from executive.store.wakeup import WakeupPipe
@@ -52,8 +53,8 @@ class Plant:
     def __init__(self):
         self.runs, self.commands, self.outcomes, self.pages = [], [], [], []
 
-    def __call__(self, prepared, *, durable, page=None, **_):
-        self.pages.append(page)
+    def __call__(self, prepared, *, durable, visitors=(), **_):
+        self.pages.append(next((each for each in visitors if isinstance(each, PageView)), None))
         outcome = self.outcomes.pop(0) if self.outcomes else "success"
         if outcome == "refused":
             raise InputError("the world is full")
@@ -206,6 +207,31 @@ def test_a_resumed_mission_writes_into_the_folder_that_it_is_given(plant):
         errand("run alone.yaml --quiet")
     assert errand("resume --quiet --out elsewhere").exit_code == 0
     assert [len(folders(out)) for out in ("elsewhere", "out")] == [1, 1]
+
+
+@pytest.mark.parametrize("command", ["queue run --quiet", "queue serve --quiet --until-idle --port 0"])
+def test_a_queue_leaves_no_recordings_when_asked(plant, command, monkeypatch):
+    seen = []
+    monkeypatch.setattr(
+        RUN_REQUEST, lambda prepared, **how: seen.append(prepared.request.record) or plant(prepared, **how)
+    )
+    add("first")
+    assert errand(f"{command} --no-record").exit_code == 0
+    add("second")
+    assert errand(command).exit_code == 0
+    assert seen == [False, True]
+
+
+def test_a_resumed_mission_leaves_no_recording_when_asked(plant, monkeypatch):
+    plant.outcomes = ["killed"]
+    with pytest.raises(GoneError):
+        errand("run alone.yaml --quiet")
+    seen = []
+    monkeypatch.setattr(
+        RUN_REQUEST, lambda prepared, **how: seen.append(prepared.request.record) or plant(prepared, **how)
+    )
+    assert errand("resume --quiet --no-record").exit_code == 0
+    assert seen == [False]
 
 
 FOUND = ["", " --out mine"]

@@ -6,6 +6,7 @@ import shutil
 import pytest
 
 from executive.app.report.run_report import RunReport
+from executive.app.runs.backend import LiveLog
 from executive.app.runs.one_run import FinishedRun
 from executive.tree.node_view import node_view
 from executive.words.goal import RefereeReport
@@ -167,6 +168,11 @@ def test_the_random_faults_of_a_run_are_printed(no_plant, tmp_path):
     assert (len(drawn[0]), drawn[0] == drawn[1], drawn[0] == drawn[2]) == (2, True, False)
 
 
+def server_of(visitors):
+    """The class of the server that gets the log."""
+    return next(type(each.server) for each in visitors if isinstance(each, LiveLog))
+
+
 def test_run_with_foxglove_serves_what_the_run_logs(no_plant, tmp_path, monkeypatch):
     served = []
 
@@ -180,8 +186,7 @@ def test_run_with_foxglove_serves_what_the_run_logs(no_plant, tmp_path, monkeypa
             served.append("closed")
 
     monkeypatch.setattr("executive.view.foxglove.LiveServer", Server)
-    monkeypatch.setattr(
-        "executive.app.runs.queue.run_request", lambda prepared, live, **_: served.append(type(live)) or 1 / 0
-    )
+    ended = lambda prepared, visitors, **_: served.append(server_of(visitors)) or 1 / 0  # noqa: E731
+    monkeypatch.setattr("executive.app.runs.queue.run_request", ended)
     errand("run", "--say", FETCH, "--foxglove", "127.0.0.1:0", "--out", str(tmp_path / "out"))
     assert served == ["127.0.0.1:0", Server, "closed"]

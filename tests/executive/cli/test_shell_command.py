@@ -2,6 +2,7 @@
 
 import pytest
 
+from executive.cli.shell_command import words_of_line
 from tests.executive.cli.calls import errand
 
 
@@ -43,3 +44,31 @@ def test_after_a_line_that_is_refused_the_next_one_is_taken(shell, line, said):
 
 def test_exit_ends_it(shell):
     assert shell("exit", "missions").stdout == ""
+
+
+# words before, the word begun, what it may become
+@pytest.mark.parametrize(
+    ("before", "typed", "found"),
+    [
+        ("", "ru", ["run", "runs"]),
+        ("run ", "fetch", ["fetch_drink"]),
+        ("check ", "patrol_", ["patrol_and_report"]),
+        ("queue add ", "own", ["own.yaml"]),
+        ("run --world ", "sh", ["shop"]),
+        ("run patrol --world ", "", ["flat", "lab", "shop"]),
+        ("run ", "--no-rec", ["--no-record"]),
+        ("replay ", "", ["out/2026-12-02-0900-b", "out/2026-12-01-0900-a"]),
+        ("log ", "out/2026-12-01", ["out/2026-12-01-0900-a", "out/2026-12-01-0900-a/"]),
+        ("tree ", "patrol_", ["patrol_and_report"]),
+        ("say go to the ", "kit", ["kitchen"]),
+        ("say bring the beer to ", "r", ["robin", "room"]),
+        ("dance ", "x", []),
+    ],
+)
+def test_missions_worlds_runs_and_places_are_completed(tmp_path, monkeypatch, before, typed, found):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own.yaml").touch()
+    for run in ("2026-12-01-0900-a", "2026-12-02-0900-b"):
+        (tmp_path / "out" / run).mkdir(parents=True)
+        (tmp_path / "out" / run / "run.json").touch()
+    assert [each.lower() for each in words_of_line(before, typed)] == found

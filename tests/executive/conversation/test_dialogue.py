@@ -175,6 +175,31 @@ def test_a_corrected_mission_is_run_to_its_end(converse, script):
     assert "detect goes on" in replies[1].text
 
 
+def test_the_robot_says_what_it_has_done(converse):
+    """The speaker asks for it again and again, from the first step on."""
+    _, replies = converse(
+        "go to the bedroom and then to the bathroom", lambda progress: "have you been to the bedroom yet?"
+    )
+    told = [reply.text for reply in replies]
+    assert (told[0], told[-1]) == ("no, not so far", "yes, I have done that")
+    assert {reply.kind for reply in replies} == {ReplyKind.ANSWER}
+
+
+@pytest.mark.parametrize(
+    ("asked", "kind", "text"),
+    [
+        ("did you bring me a coke", ReplyKind.ANSWER, "no, not so far"),
+        ("have you already brought it to Robin?", ReplyKind.ANSWER, "no, not so far"),
+        ("have you fetched the dragon", ReplyKind.REFUSED, "dragon"),
+        ("did you go to the hall three times", ReplyKind.REFUSED, "I know of single steps only"),
+        ("have you seen the coke", ReplyKind.DONE, "first: "),
+    ],
+)
+def test_a_question_about_the_past_begins_nothing(talk, asked, kind, text):
+    reply = talk().hear(asked, 1.0)
+    assert (reply.kind, text in reply.text) == (kind, True), reply
+
+
 def test_an_addition_is_corrected_while_it_waits(converse, script):
     said = {1: "and to the bathroom?", 2: "no, to the kitchen"}
     result, _ = converse("go to the bedroom", lambda progress: said.get(progress.ticks))

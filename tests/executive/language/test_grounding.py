@@ -3,7 +3,8 @@
 import pytest
 
 from executive.language.understand import Status, understand
-from executive.words.command import START, Task
+from executive.words.command import START
+from executive.words.task import task_named
 from tests.tables import table
 
 
@@ -116,7 +117,7 @@ def test_everything_needs_a_place_to_be_taken_from(understood):
 @pytest.mark.parametrize("sentence", ["go home", "please drive home", "go back home", "return home"])
 def test_home_is_the_dock_and_a_note_says_so(understood, sentence):
     answer = understood(sentence)
-    assert [command.task for command in answer.commands] == [Task.CHARGE]
+    assert [command.task for command in answer.commands] == [task_named("charge")]
     assert answer.notes == ("I take 'home' to be the dock",)
 
 

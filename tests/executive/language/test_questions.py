@@ -13,6 +13,8 @@ QUESTIONS = {
     "it": ClarifyingQuestion("?", Slot.THING, heard="it"),
     "there": ClarifyingQuestion("?", Slot.PLACE, heard="there"),
     "goal": ClarifyingQuestion("?", Slot.GOAL),
+    "where": ClarifyingQuestion("?", Slot.PLACE),
+    "what": ClarifyingQuestion("?", Slot.THING),
 }
 
 

@@ -1,6 +1,7 @@
 """Templates of sentences: their notation, and the samples beside them."""
 
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -8,13 +9,14 @@ import yaml
 
 import executive.language
 from executive.language.lexicon import word_list
-from executive.language.templates import Template, page
+from executive.language.templates import Page, Template, page
 
 TABLES = Path(executive.language.__file__).with_name("tables")
 PAGES = sorted(path.stem for path in (TABLES / "intents").glob("*.yaml") if path.stem != "common")
 WORLD = {"names": ("Robin", "Maya"), "around": ("office", "kitchen", "hall")}
 GIVEN = {
-    "people": WORLD,
+    "remarks": {"opener": ("vacuum",), "opener_form": ("vacuuming",)},
+    "rewording": {"opener": ("guide", "vacuum"), "opener_form": {"vacuuming": "vacuum"}},
     "speech": {**WORLD, "noted": ("slowly",)},
     "clauses": {"asking": tuple(word_list("openers"))},
     "robots": {"one": ("Alice", "Bob"), "verb": ("bring", "brings", "come", "go")},
@@ -27,8 +29,9 @@ LONGEST_LINE = 120
 _EXPRESSION = re.compile(r"\(\?|\\[a-zA-Z]|\[\^|[\])][+*]|\.[+*]")
 
 
+@cache
 def opened(name):
-    return page(name, **GIVEN.get(name, {}))
+    return Page(name, **GIVEN.get(name, {}))
 
 
 ROWS = [

@@ -33,6 +33,26 @@ def test_the_wake_phrase_changes_nothing_but_the_address(understood, sentence, c
     assert texts(understood(f"Hey Alice, {sentence}", require_wake=True)) == commands
 
 
+@pytest.mark.parametrize(
+    ("sentence", "lines"),
+    [
+        (
+            "take the coke to the kitchen table",
+            ["Take [Nothing] to [kitchen] and do [grasp]", "Take [coke] to [kitchen table] and do [Nothing]"],
+        ),
+        ("if a beer is in the kitchen, go to the kitchen", ["- if: {object: beer", "  then:", "  - {to: kitchen}"]),
+        ("go to the moon", ["I do not understand 'go to the moon'"]),
+        (
+            "wait 5 seconds, then go to the kitchen",
+            ["Take [Nothing] to [Nothing] and do [wait]", "Take [Nothing] to [kitchen] and do [Nothing]"],
+        ),
+    ],
+)
+def test_an_answer_reads_as_its_commands_or_its_reason(understood, sentence, lines):
+    shown = str(understood(sentence)).splitlines()
+    assert len(shown) == len(lines) and all(map(str.startswith, shown, lines))
+
+
 UNCLEAR = [(Status(status), *row) for status, rows in UNUSABLE.items() for row in rows.items()]
 
 

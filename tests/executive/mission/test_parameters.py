@@ -78,6 +78,11 @@ def test_a_setting_that_is_no_plain_value_is_refused(setting, says):
         parse_values([setting])
 
 
+def test_a_setting_that_comes_twice_is_refused():
+    with pytest.raises(InputError, match="--set room is given twice"):
+        parse_values(["room=office", "room=kitchen"])
+
+
 @pytest.mark.parametrize(("setting", "value"), [("t=14:30", "14:30"), ("n=010", "010"), ("n=1e3", 1000.0), ("n=3", 3)])
 def test_a_setting_has_the_type_that_people_mean(setting, value):
     assert list(parse_values([setting]).values()) == [value]

@@ -19,9 +19,9 @@ from mcap.writer import Writer
 
 from executive.record.event_log import EventLog, plain_values
 from executive.record.history import read_events
-from executive.record.schemas import WALL
 from executive.run.outcome import RunResult
 from executive.run.visitor import Progress, RunSettings
+from executive.words.schemas import WALL
 from skills.api import Cause
 from skills.inputs.errors import InputError
 

@@ -301,6 +301,12 @@ def test_nobody_answers_and_the_default_counts(control, clock):
     assert [event.what for event in events] == ["question", "question closed"]
 
 
+def test_words_spoken_to_the_robot_reach_it_even_if_they_are_none_of_the_choices(control, clock):
+    asked = control.ask(QUESTION, clock)
+    control.answer(QUESTION.id, "maybe", spoken=True)
+    assert asked.result() == "maybe"
+
+
 def test_wrong_answers_and_late_ones_are_refused(control, clock):
     asked = control.ask(QUESTION, clock)
     with pytest.raises(ValueError, match="choose one of: retry, skip"):

@@ -137,3 +137,19 @@ def test_a_cancel_lets_a_replaced_mission_finish_its_always(go, control, knowled
     acts = {3: lambda: control.replace(tree), 6: lambda: control.cancel("enough")}
     result, begun = go(group(LONG, always=[skill("relocalise")]), act=lambda now: acts.get(now, int)())
     assert (result.outcome, begun) == (Outcome.CANCELLED, ["relocalise"])
+
+
+@pytest.mark.parametrize("interrupted", [False, True])
+def test_an_interrupt_names_the_steps_under_always_that_stop_holds_up(go, control, interrupted):
+    def act(ticks):
+        if ticks == 3:
+            control.stop_button()
+            control.cancel("enough")
+        if ticks == 6 and interrupted:
+            raise KeyboardInterrupt
+        if ticks == 6:
+            control.cancel("enough")
+
+    result, begun = go(group(LONG, always=[skill("relocalise"), skill("stow")]), act=act)
+    assert (result.outcome, begun) == (Outcome.CANCELLED, [])
+    assert result.worst.message == "enough; in the end, broken off: relocalise and stow"

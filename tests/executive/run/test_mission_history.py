@@ -51,6 +51,15 @@ def test_any_node_adds_a_finding_by_publishing_an_answer(findings, answer):
     assert (one.answer, one.sentence, one.question) == (answer, "Robin says so", "q")
 
 
+def test_an_answer_has_the_time_of_the_last_picture_before_it(findings, clock):
+    findings.message("answer", answered("alice/patrol/1", False, "nobody"))
+    for stamp_s in (3.0, 4.5):
+        findings.message("detections", {"stamp_s": stamp_s, "detections": []})
+    clock.advance(6.0)
+    findings.message("answer", answered("alice/patrol/2", False, "nobody"))
+    assert [one.seen_s for one in findings.findings] == [None, 4.5]
+
+
 def test_speech_is_stored(findings, clock):
     clock.advance(2.0)
     findings.message("speech", {"robot": "Alice", "text": "Hello", "t": 2.0})
@@ -102,6 +111,16 @@ def test_a_mission_that_only_looked_claims_what_it_found(compiled, run_tree, scr
     assert [(one.answer, one.sentence) for one in worst.findings] == [(True, each) for each in sentences]
     assert worst.answers == {one.path_id: True for one in worst.findings}
     assert 0.0 < worst.findings[0].t_s < worst.findings[1].t_s
+
+
+def test_a_skill_adds_a_finding_by_publishing_an_answer(compiled, run_tree, script):
+    def navigate(skill):
+        skill.context.publish("answer", {"question": "the number", "answer": 42, "message": "the display shows 42"})
+        return Succeeded("there")
+
+    script.ends["navigate"] = navigate
+    worst = run_tree(compiled(CHECKS[2])).worst
+    assert ([one.answer for one in worst.findings], worst.message) == ([42], "the display shows 42")
 
 
 def test_a_mission_that_also_brought_something_claims_both(compiled, run_tree, make):

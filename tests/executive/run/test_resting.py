@@ -12,8 +12,10 @@ from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec
+from executive.tree.registry import SkillRegistry
 from skills.api import Running, Skill, Succeeded
 from skills.faults.faulty_robot import inject_faults, parse_fault
+from skills.inputs.errors import InputError
 from skills.manipulation.posture import StowInputs
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
@@ -160,3 +162,11 @@ def test_a_robot_without_a_mission_that_does_not_answer_is_left_alone(lane):
     dead = replace(bob, robot=inject_faults(bob.robot, lane.clock, [parse_fault("robot dies")]))
     assert lane.run(lane.entry("Alice", Drives, 0.0), spare=(dead,)).outcome is Outcome.SUCCESS
     assert "capabilities does not answer" in str([message for topic, message in lane.published if topic == "errors"])
+
+
+def test_a_run_of_an_old_installation_without_step_aside_is_refused_before_it_begins(lane, monkeypatch):
+    monkeypatch.setattr("executive.run.resting.installed_skills", lambda: SkillRegistry({}, {}))
+    alice = lane.entry("Alice", Drives, 0.0)
+    with pytest.raises(InputError, match="there is no skill 'step_aside'; install this project again"):
+        lane.run(alice)
+    assert alice.robot.lease_holder() is None

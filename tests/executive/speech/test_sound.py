@@ -117,6 +117,14 @@ def test_recordings_of_other_kinds_are_read(tmp_path, name, form):
     assert int(spectrum.argmax()) == 440 and level_db(heard) == pytest.approx(level_db(said), abs=0.5)
 
 
+# Heads of m4a, WebM, AAC and AMR.
+@pytest.mark.parametrize("head", [b"\0\0\0\x1cftypM4A ", b"\x1aE\xdf\xa3", b"\xff\xf1P", b"#!AMR\n"])
+def test_a_recording_of_a_phone_or_browser_is_refused_with_a_way_to_convert_it(tmp_path, head):
+    (tmp_path / "a.m4a").write_bytes(head + bytes(100))
+    with pytest.raises(InputError, match=r"a.m4a: it is a recording of a phone .* ffmpeg -i a.m4a a.wav"):
+        concatenate(read_sound(tmp_path / "a.m4a"))
+
+
 def with_sizes(content, riff, data):
     at = content.index(b"data") + 4
     return content[:4] + struct.pack("<I", riff) + content[8:at] + struct.pack("<I", data) + content[at + 4 :]

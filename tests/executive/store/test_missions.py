@@ -190,6 +190,23 @@ def test_a_store_that_cannot_be_used_is_refused(path, put, create, says):
         store.missions()
 
 
+@pytest.mark.parametrize(("text", "named"), [(b"hammer", "mission"), (b"no way", "step"), (b"blue", "value")])
+def test_a_flipped_bit_in_a_text_is_found_and_its_mission_named(path, text, named):
+    with MissionStore(path) as store:
+        store.add(REQUEST, queued=True)
+        number = store.add(replace(REQUEST, name="the hammer"), queued=True).id
+        board = {"alice/colour": "blue"}
+        store.journal(number).note(note(changed("a", Status.FAILURE, Cause.PLANNING, "no way"), board=board))
+    MissionStore(path, create=False).close()
+    content = path.read_bytes()
+    assert text in content
+    path.write_bytes(content.replace(text, bytes([text[0] ^ 1]) + text[1:]))
+    with pytest.raises(
+        InputError, match=rf"the store is damaged \(its {named} of mission {number} has changed by itself"
+    ):
+        MissionStore(path, create=False)
+
+
 def test_an_empty_store_is_damaged(path):
     path.parent.mkdir()
     path.touch()
@@ -255,7 +272,7 @@ def test_the_lowest_charge_of_a_mission_is_kept_over_a_restart_and_the_last(path
 def test_a_value_that_cannot_be_read_names_the_fix(path):
     with MissionStore(path) as store:
         store.add(REQUEST, queued=True)
-        store._connection.execute("INSERT INTO value VALUES (1, 'alice/x', '{')")
+        store._connection.execute("INSERT INTO value (mission, key, text) VALUES (1, 'alice/x', '{')")
         with pytest.raises(InputError, match=r"mission 1 cannot be taken up.*queue remove 1"):
             store.memory(1)
 

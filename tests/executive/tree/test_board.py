@@ -1,11 +1,10 @@
 """The blackboard of a run, and what ports read from it."""
 
 import math
-from dataclasses import replace
 
 import pytest
 
-from executive.tree.board import BesideBoard, Board, FromBoardOr, PlaceOf, SurfaceOfDetection
+from executive.tree.board import BesideBoard, Board, FromBoardOr, SurfaceOfDetection
 from skills.api import Surface
 from skills.robot import Pose2D
 
@@ -29,13 +28,6 @@ def test_a_port_may_be_a_pose_beside_one_on_the_board():
     board.put("alice/pose", Pose2D(1.0, 2.0, math.pi / 2))
     pose = BesideBoard("alice/pose", 0.5, 0.25).read(board)
     assert (pose.x_m, pose.y_m, pose.yaw_rad) == pytest.approx((0.75, 2.5, math.pi / 2))
-
-
-# The robot's side is (1, 1). Someone at (4, 5), 5 m off, is met 1.25 m from there; someone at (1, 2) where it stands.
-def test_a_port_may_be_the_place_of_a_person(make):
-    board = Board("alice")
-    board.put("alice/person", replace(make.COKE, position_W=(4.0, 5.0, 0.9)))
-    assert PlaceOf("alice/person").read(board) == (4.0, 5.0)
 
 
 def test_a_port_may_be_the_surface_of_a_detection(make):

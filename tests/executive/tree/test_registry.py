@@ -16,9 +16,10 @@ from typing import ClassVar
 import pytest
 
 import skills
-from executive.tree.registry import GROUP, built_in_skills, faults_of, installed_skills, missing_skill, skills_of
+from executive.tree.registry import GROUP, faults_of, installed_skills, missing_skill, skills_of
 from skills.api import Skill
 from skills.inputs.errors import InputError
+from tests.project import core_skills, project_skills
 from tests.tables import yaml_beside
 
 ROOMS = ("skills.small", "skills.people", "skills.manipulation")
@@ -67,7 +68,7 @@ def others(tmp_path, monkeypatch):
 
 
 def test_our_skills_are_found_by_name_with_typed_ports():
-    found = built_in_skills()
+    found = core_skills()
     assert {"navigate", "detect", "approach", "grasp", "place", "hand_over", "stow"} <= set(found)
     assert all(name == skill.name and dataclasses.is_dataclass(skill.Inputs) for name, skill in found.items())
 
@@ -86,18 +87,18 @@ def test_every_skill_in_the_skills_folder_is_registered_in_pyproject_and_install
                     written[kind.name].add(f"{module.__name__}:{kind.__name__}")
     assert declared.keys() == written.keys()
     assert all(declared[name] in classes for name, classes in written.items())
-    assert set(built_in_skills()) == set(written)
+    assert set(core_skills()) == set(written)
 
 
-@pytest.mark.parametrize("name", sorted(built_in_skills()))
+@pytest.mark.parametrize("name", sorted(project_skills()))
 def test_our_skills_keep_the_rules_for_skills(name):
-    assert list(faults_of(built_in_skills()[name], registered_as=name)) == []
+    assert list(faults_of(project_skills()[name], registered_as=name)) == []
 
 
 def test_a_skill_of_another_distribution_is_found_beside_ours(others):
     others()
     assert {"wave", "navigate"} <= set(installed_skills())
-    assert "wave" not in built_in_skills()
+    assert "wave" not in core_skills()
 
 
 @pytest.mark.parametrize(("old", "new", "message"), BROKEN)
@@ -120,7 +121,7 @@ def test_two_distributions_with_one_name_are_refused_naming_both(others):
 def test_another_distribution_cannot_take_the_name_of_one_of_ours(others):
     others(GOOD.replace('"wave"', '"navigate"'), entry="navigate = {module}:Wave")
     found = installed_skills()
-    assert found["navigate"] is built_in_skills()["navigate"]
+    assert found["navigate"] is core_skills()["navigate"]
     assert "both register a skill 'navigate'" in str(found.broken["navigate"])
 
 
@@ -148,7 +149,7 @@ def test_a_broken_skill_affects_no_other_and_a_file_that_uses_it_is_refused_with
     others(source)
     others(GOOD.replace('"wave"', '"wink"'), name="winkers", entry="wink = {module}:Wave", module="winkers_skill")
     found = installed_skills()
-    assert {"wink", *built_in_skills()} <= set(found)
+    assert {"wink", *core_skills()} <= set(found)
     assert "wave" not in found
     assert "distribution wavers" in missing_skill("wave", found)[0]
     assert "there is no skill" in missing_skill("wavy", found)[0]

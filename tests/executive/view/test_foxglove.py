@@ -14,7 +14,7 @@ from websockets.sync.client import connect
 
 from executive.record.event_log import EventLog
 from executive.record.history import read_events
-from executive.view.foxglove import LiveServer, serve_live
+from executive.view.foxglove import LiveServer
 from skills.inputs.errors import InputError
 
 ANY_PORT = "127.0.0.1:0"
@@ -128,8 +128,9 @@ def test_channels_of_several_robots_have_their_names(server, tmp_path, clock):
         assert {topic for topic, _, _ in client.messages(2)} == {"alice/pose", "alice/transform"}
 
 
-def test_client_that_reads_nothing_delays_neither_the_run_nor_its_end(server, log, monkeypatch):
+def test_client_that_reads_nothing_delays_neither_the_run_nor_its_end_and_holds_few_bytes(server, log, monkeypatch):
     monkeypatch.setattr("executive.view.serving.CLOSE_S", 0.2)
+    monkeypatch.setattr("executive.view.foxglove.MOST_BYTES", 1_000_000)
     log("mine", {"text": ""})
     with socket.create_connection(server.url.removeprefix("ws://").split(":")) as deaf:
         deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -149,6 +150,10 @@ def test_client_that_reads_nothing_delays_neither_the_run_nor_its_end(server, lo
         begun_s = time.perf_counter()
         for _ in range(600):
             log("mine", {"text": "z" * 20_000})  # 12 MB, far more than the socket holds
+        (client,) = server._clients
+        assert 100_000 < sum(map(len, client.data)) <= 1_000_000
+        deaf.sendall((bytes([0x81, 0x80 | len(asked)]) + bytes(4) + asked) * 100)
+        assert sum(map(len, client.data)) == client.waiting_bytes <= 1_000_000
         server.close()
         assert time.perf_counter() - begun_s < 10.0
 
@@ -216,14 +221,3 @@ def test_port_in_use_is_one_error(server):
 def test_address_without_a_port_is_refused(address):
     with pytest.raises(InputError, match="no address with a port; write HOST:PORT"):
         LiveServer(address)
-
-
-def test_nothing_is_served_without_an_address():
-    with serve_live(None, pytest.fail) as server:
-        assert server is None
-
-
-def test_the_address_is_shown():
-    lines = []
-    with serve_live(ANY_PORT, lines.append) as server:
-        assert lines == [f"Foxglove: {server.url}"] and server.url.startswith("ws://127.0.0.1:")

@@ -38,7 +38,8 @@ EVENTS = (
     Event("navigation", 1.5, {"robot": "Alice", "particle_x": [1], "particle_y": [2], "seen_x": [5], "seen_y": [0]}),
     pose(2.0, 4.0, 0.0),
 )
-CLOSED, UNKNOWN = (40, 30, 200), (150, 150, 150)
+CLOSED, UNKNOWN, OPEN = (40, 30, 200), (150, 150, 150), (30, 74, 122)
+INK = (40, 40, 40)
 
 
 def doors(stamp_s, state, seen_s):
@@ -69,7 +70,13 @@ def test_obstacles_are_drawn_once_the_robot_has_seen_them(what, place, colour, k
 def test_a_door_is_drawn_in_the_state_in_which_it_was_last_seen():
     events = (*EVENTS, doors(0.0, "unknown", None), doors(1.0, "closed", 1.0), doors(3.0, "open", 3.0))
     drawn = [colour_at(map_picture(events, at_s), 3.0, 1.0) for at_s in (0.5, 1.5, 3.5)]
-    assert drawn == [UNKNOWN, CLOSED, TRAIL]
+    assert drawn == [UNKNOWN, CLOSED, OPEN]
+
+
+def test_a_named_pose_is_a_dot_with_a_line_to_where_the_robot_looks():
+    place = {"name": "window", "x": 3.0, "y": 1.0, "yaw_rad": math.pi / 2}
+    picture = map_picture((Event("map", 0.0, {**EVENTS[0].data, "places": [place]}), *EVENTS[1:]))
+    assert [colour_at(picture, 3.0, y) == INK for y in (0.9, 1.0, 1.08, 1.2)] == [False, True, True, False]
 
 
 def tree(stamp_s, *zones):

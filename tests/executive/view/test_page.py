@@ -517,6 +517,13 @@ def test_release_is_legible_under_the_mouse(page, live):
         assert contrast(page, "#stop") >= 4.5, theme
 
 
+def test_the_map_names_the_world_where_no_run_does(page, live, feed, knowledge):
+    expect(page.locator("#world")).to_be_hidden()
+    feed("map", 0.0, map_message(GridMap(np.eye(40, dtype=bool), 0.25, (-5.0, -5.0)), knowledge, world="test"))
+    expect(page.locator("#world")).to_have_text("test")
+    expect(page.locator("#seed")).to_be_hidden()
+
+
 def test_people_are_drawn_as_people_and_not_as_obstacles(page, live, feed, knowledge):
     feed("map", 0.0, map_message(GridMap(np.eye(40, dtype=bool), 0.25, (-5.0, -5.0)), knowledge, world="test"))
     cells = {"particle_x": [], "particle_y": [], "seen_x": [1.0, 1.1, 3.0], "seen_y": [2.0, 2.1, 3.0]}

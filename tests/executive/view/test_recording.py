@@ -104,6 +104,24 @@ def test_the_camera_of_a_recording_follows_the_robot_or_shows_the_whole_world_an
         assert max(np.ptp(seen[:, 0]), np.ptp(seen[:, 1])) > 0.8
 
 
+CUT = """robot => {
+  const cut = { walls: false, robot: false };
+  viewer.scene.traverse((each) => {
+    let own = false;
+    for (let above = each; above; above = above.parent) own = own || above.name === robot;
+    if (each.isMesh && each.material.clippingPlanes) cut[own ? "robot" : "walls"] = true;
+  });
+  return cut;
+}"""
+
+
+def test_walls_are_cut_and_robots_are_not_and_a_telephone_shows_the_page_in_its_own_width(page, recording):
+    page.goto(recording.as_uri(), timeout=60_000)
+    page.wait_for_function(f"robot => ({CUT})(robot).walls", arg="Alice", timeout=60_000)
+    assert page.evaluate(CUT, "Alice") == {"walls": True, "robot": False}
+    assert page.locator("meta[name=viewport]").get_attribute("content").startswith("width=device-width")
+
+
 @pytest.fixture
 def scene(simulation, tmp_path):
     """A page around the scene of a small room, and the state of the scene after the robot has moved by a metre."""

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from executive.view import serving
-from executive.view.serving import BACKLOG, MAX_BODY, CallError, CallServer
+from executive.view.serving import BACKLOG, MAX_BODY, CallError, CallServer, open_port
 
 TOKEN = "a-token-of-the-test"
 
@@ -54,6 +54,11 @@ def test_a_call_with_the_token_is_carried_out(server, calls):
     assert (status, json.loads(answer)) == (202, {"missions": [7]})
     assert calls == [("patrol", b'{"room": "office"}')]
     assert server.url == f"http://127.0.0.1:{server.port}/missions/"
+
+
+def test_values_in_the_query_are_refused_and_carry_out_nothing(server, calls):
+    status, answer = ask(server, name="patrol?room=office", body=b"{}")
+    assert (status, calls) == (400, []) and "values belong into the body, as JSON" in json.loads(answer)["error"]
 
 
 def test_every_call_without_the_token_is_refused_in_the_same_way(server, calls):
@@ -196,3 +201,14 @@ def test_a_closed_server_answers_no_call(server):
     server.close()
     with pytest.raises(OSError):
         ask(server)
+
+
+@pytest.mark.parametrize("host", ["", "0", "0x0", "::0"])
+def test_a_host_that_means_all_addresses_unsaid_is_refused(host):
+    with pytest.raises(OSError, match=r"would open all addresses; write 0.0.0.0 for that"):
+        open_port(host, 0)
+
+
+def test_all_addresses_are_opened_when_they_are_named():
+    with open_port("0.0.0.0", 0) as opened:
+        assert opened.getsockname()[0] == "0.0.0.0"

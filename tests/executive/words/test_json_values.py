@@ -65,6 +65,11 @@ def test_damaged_text_and_missing_classes_are_refused(text):
         from_text(text)
 
 
+def test_a_text_that_is_nested_deeply_is_refused():
+    with pytest.raises(ValueError, match="no value can be read"):
+        from_text("[" * 5000)
+
+
 def test_classes_inside_functions_are_refused_when_read():
     @dataclass(frozen=True)
     class Local:

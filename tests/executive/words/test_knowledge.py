@@ -2,8 +2,8 @@ from pathlib import Path
 
 import pytest
 
-from executive.words.command import Task
 from executive.words.knowledge import load_knowledge
+from executive.words.task import task_named
 from skills.inputs.errors import InputError
 from tests.tables import table
 
@@ -32,7 +32,7 @@ def test_a_name_or_alias_is_found_in_its_sense(knowledge, sense, name, found):
 
 @pytest.mark.parametrize(*table(__file__, "default_places"))
 def test_default_place_goes_by_object_then_category_then_habit(knowledge, task, name, place):
-    assert knowledge.default_place(Task(task), name) == place
+    assert knowledge.default_place(task_named(task), name) == place
 
 
 def test_a_room_has_its_surfaces_and_a_surface_has_itself(knowledge):
@@ -71,6 +71,13 @@ def test_a_wrong_file_is_refused_with_its_line_and_the_mend(write, old, new, lin
     message = str(error.value)
     assert (error.value.line, message.split(": ")[0]) == (line, f"{path}:{line}")
     assert says in message and "\n" not in message
+
+
+@pytest.mark.parametrize(*table(__file__, "wrong_doors"))
+def test_a_door_joins_two_rooms_that_are_near_it(write, door, says):
+    with pytest.raises(InputError) as error:
+        load_knowledge(write(f"{WORLD}doors:\n- {door}\n"))
+    assert says in str(error.value)
 
 
 @pytest.mark.parametrize("text", ["", "- a\n- b\n", "just words"])

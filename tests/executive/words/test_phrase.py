@@ -6,10 +6,10 @@ from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.mission.load import load_mission
 from executive.mission.resolve import mission_from_file
 from executive.tree.compiler import compile_mission
-from executive.tree.registry import built_in_skills
 from executive.words.leaf_steps import Do
 from executive.words.phrase import ObjectPhrase, SpotPhrase
 from skills.inputs.errors import InputError
+from tests.project import core_skills
 from tests.tables import table
 
 
@@ -53,7 +53,7 @@ def test_names_that_the_world_lacks_are_refused_with_their_line(step, says, hint
     knowledge = knowledge_of(open_world("flat"))
     with pytest.raises(InputError) as refused:
         found = mission_from_file(mission(tmp_path, step), parser=None, knowledge=knowledge)
-        compile_mission(found, knowledge=knowledge, registry=built_in_skills())
+        compile_mission(found, knowledge=knowledge, registry=core_skills())
     assert says in refused.value.message
     assert hint in refused.value.hint
     assert refused.value.line == 4

@@ -7,9 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from executive.words import steps as blocks
-from executive.words.command import Command, Task
+from executive.words.command import Command
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Look, Not, ValueIs
 from executive.words.leaf_steps import Awaited, Charging, Check, Do, Dock, Set, Speak, Wait, steps_of_commands
+from executive.words.task import task_named
 from skills.api import ObjectKind
 from skills.inputs.yaml_source import parse_yaml
 
@@ -19,7 +20,9 @@ words = st.sampled_from(["beer", "red wine", "kitchen", "Nothing", "then", "if",
 seconds = st.floats(0.1, 86_000.0) | st.integers(1, 5000).map(float)
 expressions = st.sampled_from(["battery < 0.3 and not holding", 'clock >= "14:30"', "1 + 2", '"}" == drink', "true"])
 commands = st.builds(Command, item=st.none() | st.builds(ObjectKind, words), goal=words)
-checks = st.builds(Command, goal=st.none() | words, task=st.just(Task.FIND), object=st.builds(ObjectKind, words))
+checks = st.builds(
+    Command, goal=st.none() | words, task=st.just(task_named("find")), object=st.builds(ObjectKind, words)
+)
 
 
 def built(model, **values):
@@ -112,8 +115,8 @@ WRITTEN = """\
 
 def test_it_is_what_a_person_would_write():
     beer = ObjectKind("beer")
-    look = Look.from_command(Command(goal="kitchen", task=Task.FIND, object=beer))
-    grasp = Command(goal="kitchen", task=Task.GRASP, object=beer, verb="fetch")
+    look = Look.from_command(Command(goal="kitchen", task=task_named("find"), object=beer))
+    grasp = Command(goal="kitchen", task=task_named("grasp"), object=beer, verb="fetch")
     fetch = steps_of_commands([grasp, Command(item=beer, goal="start")])
     steps = (
         blocks.Choose(condition=look, then=fetch, otherwise=(Speak(speak="there is none"),)),

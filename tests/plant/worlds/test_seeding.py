@@ -6,10 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from pydrake.math import RollPitchYaw
 
+from executive.words.knowledge import Pose
+from executive.words.mission import Route
 from plant.models.catalogue import load_catalogue
 from plant.worlds.seeding import outline_W, place_objects, place_people, polygon_distance
-from plant.worlds.world import WorldError, load_world
+from plant.worlds.world import PersonRule, WorldError, load_world
 from skills.robot import Pose2D
 
 SEEDS = range(51)
@@ -96,6 +99,16 @@ def test_the_person_stands_before_the_robot_and_looks_at_it(world):
         x, y, z = robin.X_WO.translation() - [world.start.x_m, world.start.y_m, 0.0]
         assert (0.9 <= math.hypot(x, y) <= 1.3, z) == (True, 0.0)
         assert robin.X_WO.rotation().matrix()[:2, 0] @ [x, y] / math.hypot(x, y) < -0.9
+
+
+def test_a_person_with_a_pose_stands_and_faces_as_it_says_and_walks_from_there(world):
+    kim = PersonRule(name="Kim", pose=Pose(x=4.0, y=4.4, yaw=1.0))
+    walks = kim.model_copy(update={"name": "Noor", "route": Route(waypoints=("kitchen",))})
+    moved = dataclasses.replace(world, seed_rules=world.seed_rules.model_copy(update={"people": (kim, walks)}))
+    stands, sets_off = place_people(moved, 3)
+    assert stands.X_WO.translation() == pytest.approx([4.0, 4.4, 0.0])
+    assert RollPitchYaw(stands.X_WO.rotation()).yaw_angle() == pytest.approx(1.0)
+    assert (stands.route, sets_off.route.stops[0].at_W) == (None, (4.0, 4.4))
 
 
 @pytest.mark.parametrize(

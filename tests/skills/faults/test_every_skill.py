@@ -5,18 +5,16 @@ Each skill does what the first test of its file says; the fault begins soon afte
 
 import re
 from functools import cache
-from pathlib import Path
 
 import pytest
 
 from executive.testing.skill_test import bench_of_setup, load_skill_tests
-from executive.tree.registry import built_in_skills
 from skills.api import Cause
 from skills.faults.fault_kinds import STANDARD_FAULTS, Effect
 from skills.faults.faulty_robot import Fault, parse_fault
 from skills.robot_wrapper import VERBS
+from tests.project import project_skills, skill_tests
 
-FOLDER = Path(__file__).parents[1]
 PARTS = ("arm", "base", "body", "set_gripper")
 FAULTS = (
     "sensors freezes 3 s at 0.2 s",
@@ -67,14 +65,13 @@ NIGHTLY = {
 }
 
 
-SKILLS = built_in_skills()
+SKILLS = project_skills()
 
 
 @cache
 def file_of(name):
     """A skill's file of tests, and the index of the first in which all goes well."""
-    (path,) = FOLDER.rglob(f"{name}.skilltest.yaml")
-    file = load_skill_tests(path, SKILLS)
+    file = load_skill_tests(skill_tests(name), SKILLS)
     return file, next(n for n, test in enumerate(file.tests) if test.expect.outcome == "success" and not test.faults)
 
 

@@ -125,4 +125,4 @@ def test_a_broken_class_is_listed_among_the_plug_ins(installed, monkeypatch):
 def test_an_entry_point_without_its_package_is_reported(installed):
     shutil.rmtree(installed / "mugs")
     said = errand("parse", "bring me the beer", "--world", "pantry").stderr
-    assert "mugs of distribution mugs, which has classes, is no package" in said
+    assert "mugs of distribution mugs, for errand.classes, is no package" in said

@@ -1,6 +1,9 @@
 """Guarded reading of files, texts and JSON."""
 
+import bz2
+import gzip
 import json
+import lzma
 import os
 
 import pytest
@@ -41,6 +44,15 @@ def test_only_a_plain_file_below_the_limit_is_read(tmp_path, read):
             read(tmp_path / name)
         assert error.value.file == tmp_path / name
     read(tmp_path / "good")
+
+
+@pytest.mark.parametrize(("module", "command"), [(gzip, "gunzip"), (bz2, "bunzip2"), (lzma, "unxz")])
+def test_a_compressed_file_is_refused_with_the_command_that_unpacks_it(tmp_path, module, command):
+    file = tmp_path / "a.yaml.packed"
+    file.write_bytes(module.compress(b"name: x"))
+    for read in (read_text, read_all, read_path):
+        with pytest.raises(InputError, match=f"it is compressed; unpack it: {command} a.yaml.packed"):
+            read(file)
 
 
 @pytest.mark.parametrize("name", TEXTS, ids=lambda name: repr(name[:12]))

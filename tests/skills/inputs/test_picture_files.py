@@ -54,6 +54,13 @@ def test_a_picture_without_any_number_is_refused(tmp_path):
         read_pixels(file)
 
 
+@pytest.mark.parametrize("brand", [b"heic", b"heix", b"mif1"])
+def test_a_photograph_of_a_phone_is_refused_with_a_way_to_convert_it(tmp_path, brand):
+    (tmp_path / "a.heic").write_bytes(b"\0\0\0\x1cftyp" + brand + bytes(64))
+    with pytest.raises(InputError, match=r"it is HEIC, .*; save it as JPEG: heif-convert a.heic a.jpg"):
+        read_pixels(tmp_path / "a.heic")
+
+
 @pytest.mark.parametrize("suffix", ["png", "tiff"])
 def test_bytes_in_a_picture_of_16_bits_are_read_as_bytes(tmp_path, suffix):
     values = np.rint(255 * SHARES).astype(np.uint16)

@@ -5,6 +5,7 @@ import time
 from pathlib import Path
 
 import pytest
+import yaml
 from pydantic import BaseModel, ConfigDict
 
 from executive.mission.load import load_mission, load_stack
@@ -23,6 +24,12 @@ from tests.tables import table
 def test_a_scalar_has_the_type_that_people_mean(text, value):
     assert scalar_of(text) == value
     assert type(scalar_of(text)) is type(value)
+
+
+@pytest.mark.parametrize("text", ["[" * 5000, "{a: " * 5000, "- " * 5000])
+def test_a_text_that_is_nested_deeply_is_no_scalar(text):
+    with pytest.raises((ValueError, yaml.YAMLError)):
+        scalar_of(text)
 
 
 class Thing(BaseModel):

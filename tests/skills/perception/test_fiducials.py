@@ -93,7 +93,7 @@ NETWORKS = PlainColours({"coke": (255, 0, 255)})
 
 
 def test_an_object_with_a_tag_is_detected_as_its_class(table):
-    detector = with_tags(NETWORKS, [Tag(7, 0.06, on="mug"), Tag(9, 0.06, on="cup")])
+    detector = with_tags(NETWORKS, [], [Tag(7, 0.06, on="mug"), Tag(9, 0.06, on="cup")])
     assert set(detector.class_names) == {"coke", "mug", "cup"}
     (found,) = detect_in_image(detector, table)
     assert (found.class_name, found.score) == ("mug", TAG_SCORE)
@@ -107,7 +107,7 @@ def test_the_pose_of_a_wall_tag_looks_along_its_heading_with_its_top_up():
 
 
 def test_its_box_holds_the_object_and_not_the_table(table):
-    (found,) = detect_in_image(with_tags(NETWORKS, [Tag(7, 0.06, on="mug")]), table)
+    (found,) = detect_in_image(with_tags(NETWORKS, [], [Tag(7, 0.06, on="mug")]), table)
     (mug,) = detections_3d(table, HERE, [found], [TABLE])
     np.testing.assert_allclose(mug.position_W, [MUG.x, MUG.y, TABLE.height_m + 0.06], atol=0.02)
     np.testing.assert_allclose(mug.size_m, [0.09, 0.09, 0.12], atol=0.025)
@@ -116,7 +116,7 @@ def test_its_box_holds_the_object_and_not_the_table(table):
 
 def test_its_box_holds_the_object_where_the_edges_of_the_picture_show_the_floor_alone():
     far = seen_from(camera_pose(np.array([-0.3, 0.1, 1.45]), np.array([1.0, 0.1, TABLE.height_m])), 0.09)
-    (found,) = detect_in_image(with_tags(NETWORKS, [Tag(7, 0.09, on="mug")]), far)
+    (found,) = detect_in_image(with_tags(NETWORKS, [], [Tag(7, 0.09, on="mug")]), far)
     (mug,) = detections_3d(far, HERE, [found], [TABLE])
     np.testing.assert_allclose(mug.position_W, [MUG.x, MUG.y, TABLE.height_m + 0.06], atol=0.02)
 
@@ -126,17 +126,17 @@ def test_a_tag_outvotes_what_its_object_is_taken_for(table):
         def detect(self, pictures):
             return [(Detection("coke", 0.8, box), Detection("beer", 0.9, (0.0, 0.0, 40.0, 80.0))) for _ in pictures]
 
-    (tagged,) = detect_in_image(with_tags(NETWORKS, [Tag(7, 0.06, on="mug")]), table)
+    (tagged,) = detect_in_image(with_tags(NETWORKS, [], [Tag(7, 0.06, on="mug")]), table)
     box = tagged.box
-    found = detect_in_image(with_tags(Mistaken({}), [Tag(7, 0.06, on="mug")]), table)
+    found = detect_in_image(with_tags(Mistaken({}), [], [Tag(7, 0.06, on="mug")]), table)
     assert [each.class_name for each in found] == ["mug", "beer"]
 
 
 def test_without_tags_on_objects_the_detector_stays_the_same():
-    assert with_tags(NETWORKS, [Tag(3, 0.15, p_W=(1.0, 2.0, 0.5))]) is NETWORKS
+    assert with_tags(NETWORKS, [], [Tag(3, 0.15, p_W=(1.0, 2.0, 0.5))]) is NETWORKS
 
 
 def test_a_tag_without_depth_gives_its_own_box(table):
     blind = replace(table, depth_m=np.zeros_like(table.depth_m))
-    (found,) = detect_in_image(with_tags(NETWORKS, [Tag(7, 0.06, on="mug")]), blind)
+    (found,) = detect_in_image(with_tags(NETWORKS, [], [Tag(7, 0.06, on="mug")]), blind)
     assert found.box[2] - found.box[0] < 40.0

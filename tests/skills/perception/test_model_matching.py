@@ -8,7 +8,7 @@ from own_models import can_model, photographed_can
 from pydrake.math import RigidTransform
 from table_scene import BLUE, RED, TABLE, Can, scene
 
-from executive.record.work import CountedDetector, Work
+from executive.run.work import CountedDetector, Work
 from skills.api import LocalisationEstimate
 from skills.class_forms import ANY_OBJECT
 from skills.perception.model_matching import ModelDetector, identified, likeness, with_models

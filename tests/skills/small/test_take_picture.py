@@ -132,3 +132,26 @@ def test_a_camera_below_the_top_of_a_surface_takes_no_picture_of_it():
     run = bench.run(TakePicture, TakePictureInputs("the table", (0.45, 1.2, 0.75), camera="left", top=True))
     assert (run.cause, run.message.split(": ")[1].startswith("the left camera, 0.")) == (Cause.PLANNING, True)
     assert "does not see a top 0.75 m high" in run.message
+
+
+# the camera of a picture of a top 1 m high -> error and a word of its hint; None: it is taken
+@pytest.mark.parametrize(
+    ("camera", "error", "hint"),
+    [
+        ("hand", None, ""),
+        ("", None, ""),
+        ("Front left", "the frontleft camera, 0.54 m high, does not see a top 1 m high", "higher"),
+        ("tail", "the robot has no camera 'tail'", "frontleft"),
+    ],
+)
+def test_a_camera_that_is_missing_or_too_low_is_refused_before_a_run(camera, error, hint):
+    inputs = {"of": "shelf", "camera": camera, "top": True, "point_W": (1.0, 2.0, 1.0)}
+    what, more = TakePicture.refuses(inputs, SPOT.capabilities()) or (None, "")
+    assert what == error and hint in more
+    assert TakePicture.refuses({**inputs, "top": False}, SPOT.capabilities()) is None or camera == "tail"
+
+
+def test_a_robot_without_cameras_takes_no_picture_by_a_named_one():
+    blind = replace(SPOT.capabilities(), cameras=())
+    refusal = TakePicture.refuses({"camera": "hand"}, blind)
+    assert refusal == ("the robot has no camera 'hand'", "choose another kind of robot")

@@ -223,7 +223,7 @@ def test_a_head_turns_its_camera(clock):
 def test_a_head_command_beyond_the_range_or_without_a_head_is_refused(clock, robot):
     head = ScriptedRobot(clock, capabilities=FETCH.capabilities())
     refused = head.point_head(3.0, 0.0, until_s=2.0, lease=head.acquire_lease("test"))
-    assert "cannot turn to pan 3.00" in head.command_status(refused).reason
+    assert "pan 3.00 rad must lie in" in head.command_status(refused).reason
     assert head.head_rad == (0.0, 0.0)
     refused = robot.point_head(0.0, 0.0, until_s=2.0, lease=robot.acquire_lease("test"))
     assert robot.command_status(refused).reason == "there is no head"

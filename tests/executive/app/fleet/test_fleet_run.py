@@ -18,6 +18,7 @@ from executive.app.fleet.fleet_mission import FleetMission, FleetRobot, Offers, 
 from executive.app.fleet.fleet_run import TIME_LIMIT_S, run_fleet
 from executive.app.prepare.from_request import prepare
 from executive.app.prepare.prepared import Prepared
+from executive.app.runs.backend import LiveLog
 from executive.app.runs.page_view import PageView
 from executive.cli import entry
 from executive.cli.fleet_command import _to_do, resumable_lines
@@ -26,10 +27,11 @@ from executive.record.history import read_events
 from executive.run.visitor import RunEntry
 from executive.store.missions import GivenMissions, MissionStore
 from executive.tree.compiler import compile_mission
-from executive.words.command import Command, Task, parse_command
+from executive.words.command import Command, parse_command
 from executive.words.leaf_steps import Do, steps_of_commands
 from executive.words.mission import Mission
 from executive.words.steps import lines_of_steps
+from executive.words.task import task_named
 from plant.robots.robot_kind import PlacedRobot
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 from skills.inputs.errors import InputError
@@ -137,14 +139,14 @@ class Fleet:
         self.shares += [(share.tree.robot_name, share.done) for share in before]
         self.since_s.append(since_s)
 
-    def run(self, page=None, live=None, time_limit_s=None):
+    def run(self, visitors=(), control=None, time_limit_s=None):
         robots = {name: self._robot(name) for name in ROBOTS}
         missions = {number: replace(mission) for number, mission in self.missions.items()}
         offers = partial(ScriptedOffers, self)
         self.dispatch = dispatch = Dispatch(self.store, missions, robots, self, self.prepare, offers=offers)
         ended = partial(self._note_end, dispatch)
         limits = {"time_limit_s": time_limit_s}
-        run_fleet(dispatch, out=self.out, seed=3, page=page, live=live, ended=ended, **limits)
+        run_fleet(dispatch, out=self.out, seed=3, visitors=visitors, control=control, ended=ended, **limits)
         self.rows = rows = missions_json(self.store, list(dispatch.missions))
         return [(row["robot"], row["outcome"], row["reassigned"]) for row in rows]
 
@@ -153,7 +155,7 @@ class Fleet:
         self.ended.append(sum(mission.ended is not None for mission in dispatch.missions.values()))
 
     def _robot(self, name):
-        step, placed = Do.from_command(Command(task=Task.CHARGE)), PlacedRobot(name, "spot", START)
+        step, placed = Do.from_command(Command(task=task_named("charge"))), PlacedRobot(name, "spot", START)
         dock = self._prepared(Request(), Mission(name="charge", robot=name, steps=(step,)))
         return FleetRobot(placed, START, dock=dock, faults=tuple(self.faults.get(name, ())))
 
@@ -285,7 +287,7 @@ def test_the_store_has_the_robot_of_each_mission(fleet):
 def test_the_log_of_a_fleet_is_sent_live(fleet):
     fleet.queue(KITCHEN)
     followed = []
-    fleet.run(live=SimpleNamespace(follow=followed.append))
+    fleet.run(visitors=[LiveLog(SimpleNamespace(follow=followed.append))])
     assert [log.path for log in followed] == [fleet.out / "log.mcap"]
 
 
@@ -325,7 +327,7 @@ def test_a_robot_that_is_lost_is_left_out_and_its_mission_done_by_the_other(flee
 
 
 def only_alice_takes_and_only_bob_goes_to_the_bedroom(name, command):
-    takes_in_kitchen = command.task is Task.GRASP and command.goal == "kitchen"
+    takes_in_kitchen = command.task is task_named("grasp") and command.goal == "kitchen"
     return (name == "Bob" and takes_in_kitchen) or (name == "Alice" and command.goal == "bedroom")
 
 
@@ -429,7 +431,7 @@ def test_a_mission_that_is_cancelled_on_its_robots_panel_is_over_and_the_robot_g
 
     page = CancellingPage(None, lambda line: None)
     try:
-        fleet.run(page)
+        fleet.run([page], page.control)
     finally:
         page.close()
     assert sorted(row["outcome"] for row in fleet.rows) == ["cancelled", "success", "success"]
@@ -671,7 +673,7 @@ def test_a_mission_that_is_added_while_the_run_is_cancelled_stays_in_the_queue(f
 
     page = CancellingPage(None, lambda line: None)
     try:
-        outcomes = [outcome for _, outcome, _ in fleet.run(page)]
+        outcomes = [outcome for _, outcome, _ in fleet.run([page], page.control)]
     finally:
         page.close()
     assert outcomes == ["cancelled", "queued"]

@@ -1,6 +1,8 @@
 """What the kinds of robots are able to, as far as is known before a mission."""
 
+import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,16 +22,10 @@ from executive.mission.request import Request
 from executive.tree.estimate import Route
 from plant.robots.robot_kind import robot_kind
 from plant.worlds.world import load_world
+from skills.manipulation.place.skill import Place
 from skills.robot import Pose2D
 from skills.testing.robot import BASE_ONLY
 from tests.skills.exported_networks import export
-
-
-@pytest.mark.parametrize("kind", ["spot", "fetch"])
-def test_both_kinds_reach_the_floor_and_a_counter_but_not_the_ceiling(kind):
-    low_m, high_m = reached_heights_m(robot_kind(kind).capabilities())
-    assert low_m < 0.02
-    assert 0.9 < high_m < 2.2
 
 
 @pytest.mark.parametrize("kind", ["spot", "fetch"])
@@ -38,12 +34,23 @@ def test_the_payload_and_the_gripper_are_those_of_the_kind(kind):
     assert (able.lift_kg, able.opens_m) == (capabilities.arm.max_payload_kg, capabilities.gripper.max_grasp_m)
 
 
-def test_a_torso_on_a_lift_reaches_higher_than_legs():
-    assert abilities_of("fetch").reaches_m[1] > abilities_of("spot").reaches_m[1] + 0.2
+class Reaches(Place):
+    """A skill with limits of its own."""
+
+    @classmethod
+    def reached_heights_m(cls, capabilities):
+        return (0.1, 0.9)
 
 
-def test_without_an_arm_no_height_is_said():
-    assert reached_heights_m(BASE_ONLY) == (float("-inf"), float("inf"))
+def tree_of(*skills):
+    """A tree with these skills."""
+    nodes = [SimpleNamespace(skill=each) for each in (*skills, None)]
+    return SimpleNamespace(root=SimpleNamespace(walk=lambda: nodes))
+
+
+def test_a_mission_reaches_what_all_of_its_skills_reach():
+    assert reached_heights_m(tree_of(Place, Reaches), BASE_ONLY) == (0.1, 0.9)
+    assert reached_heights_m(tree_of(), BASE_ONLY) == (-math.inf, math.inf)
 
 
 # how far (m) the start lies aside: the planner's grid begins there

@@ -14,6 +14,7 @@ from executive.app.prepare.from_request import prepare
 from executive.app.report.artifacts import MOST_BYTES, Artifacts
 from executive.app.report.report_page import MissionRow, ReportPage, ReportPart, StepRow, step_rows
 from executive.app.report.run_report import ReportedAnswer, ReportedObject, RobotReport, RunReport
+from executive.app.runs.backend import LiveLog
 from executive.app.runs.one_run import mission_events, run_request
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
@@ -66,7 +67,7 @@ def test_speech_is_in_report_and_page(talk):
 def test_messages_of_a_run_are_sent_live_from_its_beginning(talk):
     sent = []
     live = SimpleNamespace(follow=lambda log: log.listen(lambda message: sent.append((message.topic, message.data))))
-    run_request(talk, ScriptedBackend(), live=live)
+    run_request(talk, ScriptedBackend(), visitors=[LiveLog(live)])
     events = read_events(talk.request.out / "log.mcap")
     assert [(topic, json.loads(data)) for topic, data in sent] == [(event.topic, event.data) for event in events]
     assert sent[0][0] == "map"

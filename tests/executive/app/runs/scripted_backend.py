@@ -24,9 +24,6 @@ class ScriptedBackend:
     def judge(self, tree, result, *, before=(), since_s=0.0):
         self.asked.append((tree.mission_name, result.outcome))
 
-    def attach(self, profile):
-        profile.attach("scripted", self.clock, "advance")
-
     notes = ()
 
     def happened(self):

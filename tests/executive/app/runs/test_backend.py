@@ -1,6 +1,7 @@
 """A run on a backend without plant, referee and recorder: nothing but the backend knows that it is not simulated."""
 
 import json
+import socket
 import sys
 from dataclasses import replace
 from importlib.metadata import entry_points
@@ -9,12 +10,13 @@ import pytest
 
 from executive.app.prepare.from_request import prepare
 from executive.app.report.run_report import RunReport
-from executive.app.runs.backend import observer
+from executive.app.runs.backend import LiveLog, observer
+from executive.app.runs.backend import observers as opened_observers
 from executive.app.runs.one_run import entry_for, run_request
+from executive.app.runs.profile import Profile
 from executive.mission.request import Request
 from executive.mission.scenario import Scenario
 from executive.record.history import read_events
-from executive.record.work import Profile
 from executive.run.outcome import Outcome
 from executive.run.worker import ThreadWorker
 from executive.words.zone import ZoneFacts
@@ -139,11 +141,11 @@ def test_a_fault_that_names_a_robot_is_at_work_in_this_robot_alone(prepared, fau
 
 def test_its_work_is_in_report_and_log_and_its_parts_are_timed(prepared):
     profile = Profile()
-    report = run_request(prepared, ScriptedBackend(), profile=profile).report
+    report = run_request(prepared, ScriptedBackend(), visitors=[profile]).report
     logged = [event.data for event in read_events(prepared.request.out / "log.mcap") if event.topic == "work"]
     assert logged == [dict(report.work)]
     assert (report.work["calls"] > 10, report.work["planner_expansions"] > 0) == (True, True)
-    assert {"scripted", "planning", "costmap", "skills", "executive", "log"} <= set(profile.table())
+    assert {"skills.navigate", "skills.testing", "executive.run", "executive.tree"} <= set(profile.table())
 
 
 def test_log_and_tree_are_left_as_after_a_simulated_run(prepared):
@@ -198,9 +200,18 @@ def test_an_observer_of_a_plug_in_joins_a_run(prepared, observers):
     assert seen.path.read_text().startswith("success after")
 
 
-@pytest.mark.parametrize("text", ["absent", "gone", "gone=3", ""])
-def test_an_observer_that_cannot_be_loaded_is_refused(observers, text):
-    with pytest.raises(InputError, match="cannot observe"):
+# what is asked for -> why it is refused
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("absent", "there is no observer 'absent'"),
+        ("", "there is no observer ''"),
+        ("gone", "cannot observe"),
+        ("gone=3", "cannot observe"),
+    ],
+)
+def test_an_observer_that_cannot_be_loaded_is_refused(observers, text, why):
+    with pytest.raises(InputError, match=why):
         observer(text)
 
 
@@ -208,3 +219,19 @@ def test_an_observer_that_takes_no_such_value_says_why(observers):
     with pytest.raises(InputError, match="needs a name"):
         observer("watch")
     assert "a watcher needs a name" in refusal("run", "patrol", "--observe", "watch")
+
+
+def test_the_observer_foxglove_names_its_address_and_ends_with_the_block(caplog):
+    with opened_observers(["foxglove=127.0.0.1:0"]) as (foxglove,):
+        (line,) = caplog.messages
+        assert line.startswith("Foxglove: ws://127.0.0.1:")
+        port = int(line.rpartition(":")[2])
+        socket.create_connection(("127.0.0.1", port)).close()
+        assert isinstance(foxglove(None, None), LiveLog)
+    with pytest.raises(OSError, match="refused"):
+        socket.create_connection(("127.0.0.1", port))
+
+
+def test_an_address_that_cannot_be_served_is_refused():
+    with pytest.raises(InputError, match="no address with a port"), opened_observers(["foxglove=nowhere"]):
+        pass

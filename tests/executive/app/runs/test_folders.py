@@ -1,5 +1,7 @@
 """Each run has a folder of its own, which says what was asked and how it ended; `last` leads to the newest."""
 
+import subprocess
+import sys
 from datetime import UTC, datetime, timedelta
 
 import pytest
@@ -76,9 +78,28 @@ def test_last_leads_to_the_newest_run_that_is_left(asked, ages, newest):
 def test_only_folders_of_runs_that_are_older_are_removed(asked):
     days = [new_run(asked, NOON - timedelta(days=age)).request.out for age in (9, 8, 1)]
     (asked.out / "2026-11-01-1200-mine").mkdir()
-    assert remove_runs(asked.out, timedelta(days=7), NOON) == days[:2]
+    assert remove_runs(asked.out, timedelta(days=7), NOON) == (days[:2], [])
     assert [kept.request.out.name for kept in kept_runs(asked.out)] == [days[2].name]
     assert (asked.out / "2026-11-01-1200-mine").is_dir()
+
+
+def test_the_folder_of_a_run_that_goes_on_stays(asked):
+    going_on, ended = (new_run(asked, NOON - timedelta(days=age)) for age in (9, 8))
+    with going_on.going_on():
+        assert remove_runs(asked.out, timedelta(days=7), NOON) == ([ended.request.out], [going_on.request.out])
+    assert remove_runs(asked.out, timedelta(days=7), NOON) == ([going_on.request.out], [])
+
+
+def test_the_folder_of_a_killed_run_is_removed(asked):
+    kept = new_run(asked, NOON - timedelta(days=9))
+    script = (
+        f"import fcntl, time; f = open({str(kept.request.out / 'run.json')!r}); fcntl.flock(f, 1); print(flush=True)"
+    )
+    with subprocess.Popen([sys.executable, "-c", f"{script}; time.sleep(60)"], stdout=subprocess.PIPE) as run:
+        run.stdout.readline()
+        assert remove_runs(asked.out, timedelta(days=7), NOON) == ([], [kept.request.out])
+        run.kill()
+    assert remove_runs(asked.out, timedelta(days=7), NOON) == ([kept.request.out], [])
 
 
 # what is in the folder, what the error says

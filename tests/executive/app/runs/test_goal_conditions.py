@@ -13,6 +13,7 @@ from executive.words.leaf_steps import CallSkill, Do, Speak, UseMission
 from executive.words.mission import Mission
 from executive.words.step import OnFailure, Policy
 from executive.words.steps import Loop, Repeat
+from skills.api import Cause, Failed, Succeeded
 from skills.small.speak import Speak as SpeakSkill
 from tests.tables import yaml_beside
 
@@ -108,6 +109,41 @@ def test_an_answer_belongs_to_its_own_check(conditions_by, script):
     assert (kitchen.answer, bedroom.answer) == (True, False)
 
 
+def test_a_step_that_ended_well_is_judged_at_its_end_when_a_later_one_fails(conditions_by, script):
+    script.seen_on = ()
+    went, grasped = conditions_by(step(GO, Policy()), step(GET, Policy()))
+    assert (went.kind, went.when, grasped.kind) == (GoalKind.WENT, When.END_OF_STEP, GoalKind.GRASPED)
+    assert went.began_s < went.ended_s <= grasped.began_s < grasped.ended_s
+
+
+def test_each_round_that_ended_well_is_judged_when_a_later_one_fails(conditions_by, script):
+    drives = []
+
+    def navigate(skill):
+        drives.append(skill)
+        return Succeeded("there") if len(drives) < 3 else Failed(Cause.PLANNING, "no way")
+
+    script.ends["navigate"] = navigate
+    rounds = conditions_by(Repeat(loop=Loop(times=3), steps=(step(GO, Policy()),)))
+    assert [one.when for one in rounds] == [When.END_OF_STEP, When.END_OF_STEP]
+
+
+# time of the last picture after the step began, None: there was none -> time at which the answer is judged
+@pytest.mark.parametrize("seen_after_s", [0.0, None])
+def test_an_answer_is_judged_at_the_last_picture_of_its_step(knowledge, registry, run_tree, seen_after_s):
+    find = step("Take [Nothing] to [kitchen] and do [find] to [coke]")
+    mission = Mission(name="m", robot="Alice", steps=(step(GO), find))
+    tree = compile_mission(mission, knowledge=knowledge, registry=registry)
+    result = run_tree(tree).robots[0]
+    begun_s = max(one.began_s for one in result.executions)
+    (answer,) = result.findings
+    seen_s = begun_s - 1.0 if seen_after_s is None else begun_s + seen_after_s
+    seen = replace(result, findings=(replace(answer, seen_s=seen_s),))
+    condition = conditions_of(tree, seen)[-1]
+    assert answer.t_s > begun_s
+    assert condition.answered_s == (answer.t_s if seen_after_s is None else seen_s)
+
+
 @pytest.fixture
 def verdict_on(knowledge, registry, run_tree):
     """The verdict on a mission that ran with the scripted robot, when all its conditions hold or none does."""
@@ -181,6 +217,15 @@ def test_speech_does_not_end_the_condition_on_the_robots_place(spoken):
     verdict, asked = spoken(HELLO, step(GO, Policy()), HELLO)
     assert verdict.success is True
     assert [(one.kind, one.when) for one in asked] == [(GoalKind.WENT, When.END_OF_MISSION)]
+
+
+@pytest.mark.usefixtures("house_tasks")
+def test_the_page_of_a_task_learns_what_the_robot_said_in_its_step_and_when(spoken):
+    _, asked = spoken(HELLO, step("Take [Nothing] to [Nothing] and do [call] to [dinner]"), HELLO)
+    (own,) = asked
+    (spoken_s,) = own.spoken_s
+    assert own.said == ("dinner",)
+    assert own.began_s <= spoken_s < own.ended_s  # and not when the next step spoke
 
 
 def each_with(**facts):

@@ -6,12 +6,14 @@ import subprocess
 import sys
 from contextlib import closing, suppress
 from functools import partial
+from types import SimpleNamespace
 
 import pytest
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 
 from executive.app.prepare.from_request import prepare
+from executive.app.runs.backend import OpenRun
 from executive.app.runs.page_view import PageView, add_to, queue_function, sentence_action
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
@@ -138,7 +140,7 @@ class CountedScene:
 def test_a_page_opened_after_the_run_gets_the_last_poses(page, tmp_path, clock):
     scene = CountedScene()
     with closing(EventLog(tmp_path / "log.mcap", clock)) as log:
-        page.serve(log, scene)
+        page.opened(OpenRun(log, SimpleNamespace(show_live=lambda: scene)))
     page.stay(0.1)
     assert scene.refreshes == 1
     assert [json.loads(text)["data"] for text in page._feed.since((0, 0))[1] if '"scene"' in text] == [{"poses": {}}]

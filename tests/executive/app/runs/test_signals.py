@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from executive.app.runs import signals
 from executive.app.runs.signals import ended_by_signals, interrupted_by_hang_up
 from executive.record.history import read_history
 from executive.run.control import Control
@@ -87,6 +88,34 @@ def test_a_second_ctrl_c_breaks_in_and_a_second_hang_up_does_not():
             signal.raise_signal(number)
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
+
+
+def test_sigterm_breaks_in_when_the_block_does_not_end(monkeypatch):
+    monkeypatch.setattr(signals, "_ENDS_WITHIN_S", 0.01)
+    reasons = []
+    with ended_by_signals(reasons.append), ended_by_signals(reasons.append):
+        signal.raise_signal(signal.SIGTERM)
+        with pytest.raises(KeyboardInterrupt, match="cancelled by SIGTERM"):
+            signal.pause()
+    assert reasons == ["cancelled by SIGTERM"] * 2
+
+
+def test_after_the_block_nothing_is_left_of_the_limit():
+    with ended_by_signals(Control(pace=None).cancel):
+        signal.raise_signal(signal.SIGTERM)
+        assert signal.getitimer(signal.ITIMER_REAL)[0] < 5.0
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
+def test_an_alarm_of_others_reaches_them_in_the_block():
+    rung = []
+    before = signal.signal(signal.SIGALRM, lambda number, frame: rung.append(number))
+    try:
+        with ended_by_signals(Control(pace=None).cancel):
+            signal.raise_signal(signal.SIGALRM)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    assert rung == [signal.SIGALRM]
 
 
 def test_a_hang_up_ends_listening_as_ctrl_c_does():

@@ -11,9 +11,9 @@ from tiny_detector import CLASSES, model_bytes, write_model
 from executive.app.prepare.placed_robots import TURNING_M, refuse_blocked, shared_detector, stand_at
 from executive.app.runs import simulated
 from executive.app.runs.simulated import Bystanders, TruthLog, compile_first
-from executive.record.schemas import schemas
 from executive.run.control import Control
 from executive.run.visitor import Progress
+from executive.words.schemas import schemas
 from plant.worlds.seeding import place_people
 from plant.worlds.world import load_world
 from skills.api import Question
@@ -39,7 +39,7 @@ def test_the_first_run_on_a_machine_compiles_and_says_so_once(commands, tmp_path
 
 
 def test_a_later_run_compiles_nothing_and_says_nothing(commands, tmp_path, caplog):
-    (tmp_path / "lattice.search-93.py311.nbi").touch()
+    (tmp_path / "compiled.distances-93.py311.nbi").touch()
     compile_first(tmp_path)
     assert (commands, caplog.messages) == ([], [])
 
@@ -125,12 +125,19 @@ def test_a_person_who_hears_a_question_answers_it_after_a_second():
     assert asked.done() and asked.result() == "yes" and stage.settled == 1
 
 
-@pytest.mark.parametrize(("hearer", "answer"), [(None, "yes"), ("Robin", None), ("Robin", "perhaps")])
+@pytest.mark.parametrize(("hearer", "answer"), [(None, "yes"), ("Robin", None)])
 def test_a_question_without_hearer_or_answer_stays_open(hearer, answer):
     stage = Stage(hearer, answer)
     asked = stage.ask()
     stage.after(3.0)
     assert not asked.done()
+
+
+def test_an_answer_that_is_no_option_is_heard():
+    stage = Stage("Robin", "perhaps")
+    asked = stage.ask()
+    stage.after(1.2)
+    assert asked.result() == "perhaps"
 
 
 def test_a_question_that_is_put_again_is_answered_again():

@@ -1,27 +1,20 @@
 """Tests of solid cells from depth pictures, and of the boxes that cover them."""
 
-from dataclasses import replace
-
 import numpy as np
 from pydrake.math import RigidTransform
 from table_scene import CAMERA, TABLE, Can, scene
 
-from skills.grid_map import GridMap
+from skills.grid_map import CELL_M
 from skills.manipulation.arm.solid_cells import (
-    CELL_M,
     Outline,
     add_picture,
     add_view,
     boxes_around,
-    column_boxes,
     hidden_boxes,
-    map_columns,
     merge_cells,
     never_seen,
     solid_boxes,
-    wall_columns,
 )
-from skills.world_model import Surface
 
 NOTHING = np.empty((0, 3), dtype=np.int64)
 BODY = RigidTransform([0.0, 0.0, 0.5])
@@ -136,60 +129,3 @@ def test_only_the_last_views_are_stored():
 def test_a_view_does_not_keep_the_whole_image_in_memory():
     ((view, _),) = add_view((), picture(), RigidTransform())
     assert view.depth_m.base is None
-
-
-def grid_of(*rectangles):
-    """A grid of 2 m x 2 m with occupied rectangles (x0, y0, x1, y1) in m."""
-    occupied = np.zeros((80, 80), dtype=bool)
-    for x0, y0, x1, y1 in rectangles:
-        occupied[round(y0 / 0.025) : round(y1 / 0.025), round(x0 / 0.025) : round(x1 / 0.025)] = True
-    return GridMap(occupied, 0.025, (0.0, 0.0))
-
-
-WALL, TABLE_EDGE, CHAIR_BACK, SOFA = (
-    (0.0, 0.0, 2.0, 0.1),
-    (0.2, 1.0, 1.2, 1.05),
-    (1.5, 1.0, 1.55, 1.4),
-    (1.4, 1.6, 2, 2),
-)
-DESK = Surface("desk", ((0.2, 1.0), (1.2, 1.0), (1.2, 1.6), (0.2, 1.6)), 0.75)
-
-
-def shows_wall(columns, *rectangle):
-    (x0, y0, x1, y1), middles = rectangle, (columns + 0.5) * CELL_M
-    return bool(np.any(np.all((middles > (x0 - 0.03, y0 - 0.03)) & (middles < (x1 + 0.03, y1 + 0.03)), axis=1)))
-
-
-def test_walls_are_what_all_grids_show():
-    high, low = grid_of(WALL, CHAIR_BACK), grid_of(WALL, SOFA)
-    columns = wall_columns([high, low], ())
-    assert shows_wall(columns, *WALL)
-    assert not shows_wall(columns, *CHAIR_BACK)
-    assert not shows_wall(columns, *SOFA)
-    assert shows_wall(wall_columns([high], ()), *CHAIR_BACK)  # a map without a second grid cannot tell
-
-
-def test_the_edges_of_surfaces_and_single_posts_are_no_walls():
-    columns = wall_columns([grid_of(WALL, TABLE_EDGE, (1.6, 0.6, 1.65, 0.65))], [DESK])
-    assert shows_wall(columns, *WALL)
-    assert not shows_wall(columns, *TABLE_EDGE)
-    assert not shows_wall(columns, 1.6, 0.6, 1.65, 0.65)
-    assert len(wall_columns([grid_of()], [DESK])) == 0
-
-
-def test_a_wall_is_solid_at_all_heights_of_the_arm_within_its_reach():
-    boxes = column_boxes(map_columns([grid_of(WALL)], ()), BODY, 1.0, lambda p_W: p_W[:, 0] < 0.4)
-    assert inside(boxes, (0.6, 0.05, 0.3))
-    assert inside(boxes, (0.6, 0.05, 1.8))
-    assert not inside(boxes, (0.2, 0.05, 1.0))
-    assert not inside(boxes, (1.5, 0.05, 1.0))
-
-
-def test_furniture_is_solid_from_just_below_its_lowest_surface_to_the_floor():
-    shelf = replace(DESK, height_m=1.2)
-    boxes = column_boxes(map_columns([grid_of(WALL)], [shelf, DESK]), BODY, 2.0, nothing_of)
-    assert inside(boxes, (0.7, 1.3, 0.1))
-    assert inside(boxes, (0.7, 1.3, DESK.height_m - 0.05))
-    assert not inside(boxes, (0.7, 1.3, DESK.height_m - 0.005))
-    assert not inside(boxes, (0.7, 1.3, 1.1))
-    assert not inside(boxes, (1.4, 1.3, 0.5))

@@ -59,6 +59,15 @@ def test_nobody_in_sight_is_a_failed_precondition():
     failed(HandOver(context_of(robot)), HandOverInputs("Robin"), Cause.PRECONDITION, "nobody is seen near")
 
 
+# person, met before -> whom the result names
+@pytest.mark.parametrize(
+    ("person", "met", "whom"), [("Robin", True, "Robin"), ("somebody", False, "somebody"), ("person", False, "person")]
+)
+def test_the_result_names_a_person_only_whom_the_robot_has_met(person, met, whom):
+    given = outcome(HandOver(context_of(_before_robin(carries=True))), replace(BEER, person=person, met=met))
+    assert given.message == f"gave the beer to {whom}"
+
+
 @pytest.mark.parametrize("y", [-0.4, 0.0, 0.4])
 def test_the_object_is_held_out_near_the_person_without_contact(y):
     robot = _before_robin(scan_now=scan_of([(1.4, y, 0.2)]), things=None)
@@ -74,7 +83,7 @@ def test_the_object_is_held_out_near_the_person_without_contact(y):
 
 def test_a_pull_opens_the_gripper_and_the_hand_is_drawn_in():
     robot = _before_robin(carries=True)
-    assert outcome(HandOver(context_of(robot)), BEER).message == "gave the beer to Robin"
+    assert outcome(HandOver(context_of(robot)), BEER).message == "gave the beer to somebody, taken for Robin"
     assert not (robot.holding or robot.carries)
     assert robot.q_rad == pytest.approx(MODEL.stowed_rad, abs=0.06)
 
@@ -96,7 +105,7 @@ class _Rolling(_Person):
 @pytest.mark.parametrize(
     ("rests_s", "message"),
     [
-        (15.0, "gave the beer to Robin"),
+        (15.0, "gave the beer to somebody, taken for Robin"),
         (math.inf, "the beer still moves where it was released before Robin"),
     ],
 )
@@ -195,7 +204,7 @@ def test_paused_at_any_tick_it_goes_on_and_gives_it(every):
         while isinstance(step := skill.step(), Running):
             robot.advance(0.1)
             assert robot.now() < 120.0
-        assert step.message == "gave the beer to Robin", (pause, step)
+        assert step.message == "gave the beer to somebody, taken for Robin", (pause, step)
         assert not robot.holding
 
 
@@ -206,7 +215,7 @@ def test_after_a_restart_a_released_object_is_given():
     skill.resume(BEER)
     while isinstance(step := skill.step(), Running):
         robot.advance(0.1)
-    assert step.message == "gave the beer to Robin"
+    assert step.message == "gave the beer to somebody, taken for Robin"
 
 
 def test_poses_before_a_person_face_them_and_the_nearest_comes_first():

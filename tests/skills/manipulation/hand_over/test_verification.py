@@ -61,7 +61,10 @@ def _at_release(colour, base_m=LEVEL_M - 0.06):
 
 
 def test_an_object_seen_at_its_release_point_is_given():
-    assert outcome(HandOver(context_of(_robot(_at_release(RED)))), COKE).message == "gave the coke to Robin"
+    assert (
+        outcome(HandOver(context_of(_robot(_at_release(RED)))), COKE).message
+        == "gave the coke to somebody, taken for Robin"
+    )
 
 
 def test_two_fingers_are_drawn_straight_back_from_a_released_object():

@@ -9,6 +9,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import Detection, Surface
+from skills.geometry import SPOT_EDGE_M, surface_spots
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.held_object import HeldObject
 from skills.manipulation.arm.kinematics import arm_model
@@ -16,7 +17,6 @@ from skills.manipulation.arm.motion import RrtConnect
 from skills.manipulation.place.free_spots import (
     BESIDE_M,
     CLEARANCE_M,
-    EDGE_M,
     SpotSearch,
     above_goal,
     clear_heights,
@@ -26,7 +26,6 @@ from skills.manipulation.place.free_spots import (
     hold_on_path,
     longest_edge_rad,
     spaced_spots,
-    spots,
     unseen_view,
 )
 from skills.perception.detection_3d import Detection3D
@@ -36,6 +35,7 @@ from skills.perception.surface_segmentation import Cluster, SurfaceView
 from skills.relations import Landmark, Relation, RelationKind
 
 TABLE = Surface("table", ((1.0, -0.5), (1.6, -0.5), (1.6, 0.5), (1.0, 0.5)), 0.7)
+SPOTS = surface_spots(TABLE.polygon_W)
 DOWN = RotationMatrix.MakeYRotation(np.pi / 2)
 SCREWDRIVER = HeldObject(
     DOWN, np.array([[x, y, z] for x in (0.21, 0.24) for y in (-0.1, 0.1) for z in (-0.015, 0.015)])
@@ -66,37 +66,37 @@ def _view(seen_y=(-0.5, 0.5), things=()):
 
 
 def test_spots_keep_off_the_edges():
-    found = spots(TABLE)
-    assert found[:, 0].min() == pytest.approx(1.0 + EDGE_M)  # no nearer to the robot than need be
-    assert found[:, 0].max() <= 1.6 - EDGE_M + 1e-9
+    found = SPOTS
+    assert found[:, 0].min() == pytest.approx(1.0 + SPOT_EDGE_M)  # no nearer to the robot than need be
+    assert found[:, 0].max() <= 1.6 - SPOT_EDGE_M + 1e-9
 
 
 def test_a_small_surface_has_its_middle_as_spot():
     small = Surface("stool", ((0.0, 0.0), (0.12, 0.0), (0.12, 0.12), (0.0, 0.12)), 0.4)
-    assert spots(small) == pytest.approx(np.array([[0.06, 0.06]]))
+    assert surface_spots(small.polygon_W) == pytest.approx(np.array([[0.06, 0.06]]))
 
 
 def test_spots_within_a_forbidden_circle_are_left_out():
-    found = clear_spots(spots(TABLE), [(1.3, 0.0, 0.25), (1.1, -0.4, 0.1)])
-    assert 0 < len(found) < len(spots(TABLE))
+    found = clear_spots(SPOTS, [(1.3, 0.0, 0.25), (1.1, -0.4, 0.1)])
+    assert 0 < len(found) < len(SPOTS)
     assert np.linalg.norm(found - [1.3, 0.0], axis=1).min() > 0.25
     assert np.linalg.norm(found - [1.1, -0.4], axis=1).min() > 0.1
 
 
 def test_spots_near_an_object_are_not_free():
-    free = free_spots(_view(things=((1.3, 0.0),)), spots(TABLE))
+    free = free_spots(_view(things=((1.3, 0.0),)), SPOTS)
     assert len(free) > 0
     assert np.linalg.norm(free - [1.3, 0.0], axis=1).min() > CLEARANCE_M
 
 
 def test_an_unseen_spot_is_not_free():
-    free = free_spots(_view(seen_y=(0.0, 0.5)), spots(TABLE))
+    free = free_spots(_view(seen_y=(0.0, 0.5)), SPOTS)
     assert free[:, 1].min() > -0.04
 
 
 def test_a_full_table_has_no_free_spot():
     things = tuple((x, y) for x in np.arange(1.05, 1.6, 0.1) for y in np.arange(-0.45, 0.5, 0.1))
-    assert len(free_spots(_view(things=things), spots(TABLE))) == 0
+    assert len(free_spots(_view(things=things), SPOTS)) == 0
 
 
 def test_a_clear_spot_comes_before_a_nearer_one_beside_an_object_and_a_tried_one_is_left_out():
@@ -117,10 +117,10 @@ def test_the_part_of_a_surface_that_no_picture_shows_comes_after_the_free_part()
 
 
 def test_a_hidden_surface_is_free_except_near_known_objects():
-    free = free_spots(unseen_view(TABLE, np.array([[1.3, 0.0, 0.78]])), spots(TABLE))
-    assert 0 < len(free) < len(spots(TABLE))
+    free = free_spots(unseen_view(TABLE, np.array([[1.3, 0.0, 0.78]])), SPOTS)
+    assert 0 < len(free) < len(SPOTS)
     assert np.linalg.norm(free - [1.3, 0.0], axis=1).min() > CLEARANCE_M - 0.04
-    assert len(free_spots(unseen_view(TABLE, np.empty((0, 3))), spots(TABLE))) == len(spots(TABLE))
+    assert len(free_spots(unseen_view(TABLE, np.empty((0, 3))), SPOTS)) == len(SPOTS)
 
 
 def test_a_narrow_object_fits_on_a_tight_spot_at_the_end_and_a_full_surface_says_what_stands_there():
@@ -304,4 +304,4 @@ def test_between_two_of_a_kind_needs_two_objects():
     search.see([_seen("beer", 1.3, 0.3), _seen("beer", 1.31, 0.32)])
     assert search.missing() == (BEER, BEER)
     search.see([_seen("beer", 1.3, -0.3)])
-    assert 0 < len(search.spots()) < len(spots(TABLE))
+    assert 0 < len(search.spots()) < len(SPOTS)

@@ -1,18 +1,19 @@
 """Detector of an exported network: preparation of the picture, class names, words, suppression, and refusals."""
 
 import numpy as np
+import onnx
 import pytest
 
 from executive.testing.skill_test import carry_out, load_skill_tests, scripted_maker
-from executive.tree.registry import built_in_skills
 from plant.robots.spot.kind import spot_capabilities
 from skills.inputs.errors import InputError
 from skills.perception.detector import Cascade
 from skills.perception.detector.exported import ExportedNetwork, load_exported, place
-from skills.perception.detector.layouts import SMOOTH
+from skills.perception.detector.layouts import LAYOUTS
 from skills.perception.detector.model_files import ModelFileError
 from skills.stack import stack_of
 from skills.testing.blocks import TABLE_CAN
+from tests.project import core_skills
 from tests.skills.exported_networks import coloured_patch, export, mean_colour
 
 THREE = {"names": "{0: 'bottle', 1: 'coke', 2: 'hammer'}"}
@@ -102,6 +103,13 @@ def rfdetr(classes):
     return {"dets": np.full((1, 8, 4), 0.5, np.float32), "labels": np.zeros((1, 8, classes), np.float32)}
 
 
+def detr(classes):
+    """Output of a DETR whose last class is the likeliest of all boxes, with a logit below zero."""
+    logits = np.full((1, 8, classes), -4, np.float32)
+    logits[..., -1] = -1
+    return {"pred_boxes": np.full((1, 8, 4), 0.5, np.float32), "logits": logits}
+
+
 @pytest.mark.parametrize(
     ("outputs", "metadata", "expected"),
     [
@@ -116,6 +124,10 @@ def test_fewer_names_than_the_network_has_classes_are_refused(tmp_path, outputs,
 @pytest.mark.parametrize("names", [("bottle", "coke", "beer", "hammer"), {1: "coke"}])
 def test_a_class_for_no_object_needs_no_name_and_a_table_names_some(tmp_path, names):
     assert "coke" in network(tmp_path, rfdetr(5), metadata={}, names=names).build().class_names
+
+
+def test_as_many_classes_as_names_leave_none_for_no_object(tmp_path):
+    assert network(tmp_path, detr(3)).build().layout == "detr"
 
 
 def test_an_empty_line_between_names_is_refused_with_its_place(tmp_path):
@@ -160,6 +172,22 @@ def refusal(component):
         ),
         (yolo([0] * 8), {**THREE, "task": "obb"}, "of no layout that Errand reads (task 'obb')"),
         ({"out": np.ones((1, 17, 5), np.float32)}, THREE, "images float (1, 3, 64, 64) -> out (1, 17, 5)"),
+        (
+            {"a": np.ones((1, 24, 8, 8), np.float32), "b": np.ones((1, 24, 4, 4), np.float32)},
+            THREE,
+            "of a head, whose boxes are still to be computed",
+        ),
+        ({"out": np.full((1, 84, 35), -1, np.float32)}, THREE, "of a head, whose boxes are still to be computed"),
+        (
+            {"boxes": np.full((1, 9, 4), -1, np.float32), "scores": np.full((1, 9, 3), -1, np.float32)},
+            THREE,
+            "of no layout that Errand reads",
+        ),
+        (yolo([32, 32, 20, 20, -3.0, 8.0, -2.0]), THREE, "its scores go from -3 to 8, and not from 0 to 1"),
+        (yolo([32, 32, 20, 20, 0.0, np.nan, 0.0]), THREE, "export it in full precision"),
+        (yolo([900, 32, 20, 20, 0.0, 0.9, 0.0]), THREE, "as yolo it finds the box"),
+        ({"found": np.zeros((0, 7), np.float32)}, THREE, "'layout: yolov7_nms' (YOLOv7 with suppression"),
+        (detr(4), THREE, "write 'layout: detr' (RT-DETR and D-FINE of Transformers"),
         (yolo([0] * 8), {}, "its layout is yolo with 4 classes, and none are named"),
         (yolo([0] * 8), THREE, "its layout is yolo with 4 classes, and 3 are named"),
         (yolo([0] * 5), {"names": "{0: 'chair'}"}, "none of its classes is a word of Errand (chair)"),
@@ -179,6 +207,7 @@ def test_a_network_that_is_no_detector_with_names_is_refused(tmp_path, outputs, 
         ({"classes": {"bottle": "bear"}}, "'classes' names 'bear', which has no class_forms"),
         ({"layout": "yolov8"}, "there is no layout 'yolov8'"),
         ({"layout": "darknet"}, "its outputs are not of layout darknet"),
+        ({"layout": "yolo_nas"}, "its outputs are not of layout yolo_nas"),
     ],
 )
 def test_options_that_do_not_fit_the_network_are_refused_with_the_likely_ones(tmp_path, options, expected):
@@ -187,7 +216,7 @@ def test_options_that_do_not_fit_the_network_are_refused_with_the_likely_ones(tm
     assert "did you mean" in message or "leave out 'layout'" in message
 
 
-@pytest.mark.parametrize("shape", [(1, 1, 64, 64), (1, 64, 64, 3), (1, 3)])
+@pytest.mark.parametrize("shape", [(1, 1, 64, 64), (1, 64, 64, 1), (1, 3)])
 def test_an_input_that_is_no_picture_in_colour_is_refused(tmp_path, shape):
     file = export(tmp_path / "own.onnx", yolo([0] * 7), shape=shape, metadata=THREE)
     assert "it takes no picture in colour: images float" in refusal(ExportedNetwork(file))
@@ -198,6 +227,105 @@ def test_a_file_that_is_no_onnx_is_refused(tmp_path):
     message = refusal(ExportedNetwork(tmp_path / "own.pt"))
     assert "no ONNX file" in message
     assert "yolo export" in message
+
+
+def test_a_file_whose_weights_are_missing_is_refused_with_their_file(tmp_path):
+    file = export(tmp_path / "own.onnx", yolo([32, 32, 20, 20, 0.1, 0.9, 0.2]), metadata=THREE)
+    onnx.save(onnx.load(file), file, save_as_external_data=True, location="own.data", size_threshold=0)
+    assert ExportedNetwork(file).build().class_names == ("coke", "hammer")
+    (tmp_path / "own.data").unlink()
+    assert "its weights are in own.data, which is missing; copy it along" in refusal(ExportedNetwork(file))
+
+
+def test_an_operation_of_another_runtime_is_refused_without_calling_the_file_damaged(tmp_path):
+    model = onnx.load(export(tmp_path / "own.onnx", yolo([0] * 7), metadata=THREE))
+    model.graph.node[0].op_type = "EfficientNMS_TRT"
+    onnx.save(model, tmp_path / "own.onnx")
+    message = refusal(ExportedNetwork(tmp_path / "own.onnx"))
+    assert "ONNX Runtime cannot run it" in message
+    assert "damaged" not in message
+
+
+def test_an_input_beside_the_picture_that_errand_cannot_give_is_refused(tmp_path):
+    model = onnx.load(export(tmp_path / "own.onnx", yolo([0] * 7), metadata=THREE))
+    model.graph.input.append(onnx.helper.make_tensor_value_info("input_ids", onnx.TensorProto.INT64, (1, 16)))
+    onnx.save(model, tmp_path / "own.onnx")
+    assert "beside the picture it takes 'input_ids'" in refusal(ExportedNetwork(tmp_path / "own.onnx"))
+
+
+def test_a_mask_of_pixels_beside_the_picture_is_filled(tmp_path):
+    model = onnx.load(export(tmp_path / "own.onnx", yolo([32, 32, 20, 20, 0.1, 0.9, 0.2]), metadata=THREE))
+    model.graph.input.append(onnx.helper.make_tensor_value_info("pixel_mask", onnx.TensorProto.INT64, ("b", "h", "w")))
+    onnx.save(model, tmp_path / "own.onnx")
+    assert scores(ExportedNetwork(tmp_path / "own.onnx").build()) == {"coke": 0.9}
+
+
+def test_a_layout_whose_labels_would_be_the_scores_is_refused(tmp_path):
+    outputs = {"output": np.array([[0, 16, 8, 48, 56, 1, 0.9]], np.float32)}
+    assert "are not of layout yolo_nas" in refusal(network(tmp_path, outputs, layout="yolo_nas"))
+    assert scores(network(tmp_path, outputs, layout="yolov7_nms").build()) == {"coke": 0.9}
+
+
+def test_labels_of_tensorflow_count_from_one(tmp_path):
+    outputs = {
+        "detection_boxes": np.array([[[0.1, 0.1, 0.5, 0.5]]], np.float32),
+        "detection_scores": np.array([[0.9]], np.float32),
+        "detection_classes": np.array([[2]], np.float32),
+    }
+    options = {"metadata": {}, "classes": {"bottle": "beer"}}
+    message = refusal(network(tmp_path, outputs, names=("bottle", "cup"), **options))
+    assert "write 'names: {1: bottle, 2: cup}'" in message
+    detector = load_exported(network(tmp_path, outputs, names={1: "cup", 2: "bottle"}, **options), every=True)
+    assert scores(detector) == {"beer": 0.9}
+
+
+def test_a_label_beyond_the_names_is_refused(tmp_path):
+    outputs = {"output0": np.array([[[16, 8, 48, 56, 0.9, 3]]], np.float32)}
+    message = refusal(network(tmp_path, outputs, metadata={}, names=("bottle", "coke", "hammer")))
+    assert "its layout is end_to_end with 4 classes, and 3 are named" in message
+
+
+def test_one_class_of_yolov5_has_the_score_of_any_object(tmp_path):
+    rows = np.zeros((1, 252, 6), np.float32)
+    rows[..., 5], rows[0, 7] = 0.5, [32, 32, 20, 20, 0.9, 0.5]
+    detector = network(tmp_path, {"output": rows}, metadata={}, names=("coke",)).build()
+    assert scores(detector) == {"coke": 0.9}
+
+
+def test_one_class_of_yolov5_that_rounds_to_one_is_no_label(tmp_path):
+    rows = np.zeros((1, 252, 6), np.float16)
+    rows[..., 5], rows[0, 7] = 1.0, [32, 32, 20, 20, 0.9, 1.0]
+    detector = network(tmp_path, {"output": rows}, metadata={}, names=("coke",)).build()
+    assert (detector.layout, scores(detector)) == ("yolov5", {"coke": 0.9})
+
+
+def test_a_class_of_the_background_is_not_reported(tmp_path):
+    outputs = yolo([32, 32, 20, 20, 0.9, 0.1, 0.1], [12, 12, 10, 10, 0.1, 0.8, 0.1])
+    component = network(tmp_path, outputs, metadata={}, names=("background", "coke", "hammer"))
+    assert scores(load_exported(component, every=True)) == {"coke": 0.8}
+
+
+def test_pictures_in_colour_have_the_range_and_order_that_windows_metadata_say(tmp_path):
+    told = {"names": "{0: 'red', 1: 'green', 2: 'blue'}"}
+    told |= {"Image.BitmapPixelFormat": "Bgr8", "Image.NominalPixelRange": "NominalRange_0_255"}
+    detector = load_exported(
+        ExportedNetwork(mean_colour(tmp_path / "own.onnx", metadata=told), scale=0.001), every=True
+    )
+    assert scores(detector) == {"blue": 0.2}
+
+
+def test_a_detector_says_how_it_reads_its_network(tmp_path):
+    about = network(tmp_path, classes={"bottle": "beer"}).build().about
+    assert "takes RGB of 64 x 64 (letterbox) from 0 to 1" in about
+    assert "scores up to 0.90, boxes in the picture" in about
+    assert "labels 0 bottle (beer), 1 coke, 2 hammer" in about
+
+
+def test_a_network_that_runs_with_one_size_alone_is_refused_or_gets_that_size(tmp_path):
+    outputs = {"boxes": np.array([[16, 8, 48, 56]], np.float32), "labels": np.array([1]), "scores": np.float32([0.9])}
+    detector = network(tmp_path, outputs).build()
+    assert detector.preparation.fit == "letterbox"
+    assert detector.detect([np.zeros((32, 64, 3), np.uint8)])[0][0].box == pytest.approx((16, 0, 48, 32))
 
 
 def test_a_file_that_is_missing_is_refused(tmp_path):
@@ -231,7 +359,7 @@ def test_a_skill_finds_an_object_with_an_own_network(tmp_path, index):
     (tmp_path / "own.yaml").write_text("detector: {use: onnx, file: own.onnx, classes: {can: coke}}\n")
     path = tmp_path / "own.skilltest.yaml"
     path.write_text(SKILL_TESTS)
-    skills = built_in_skills()
+    skills = core_skills()
     file = load_skill_tests(path, skills)
     trial = carry_out(file, index, skills["detect"], {"scripted": scripted_maker(spot_capabilities())})
     assert not trial.differences, trial.report()
@@ -242,4 +370,4 @@ def test_smooth_scaling_gives_the_bytes_of_pillow(shape, size_px):
     image = pytest.importorskip("PIL.Image")
     picture = np.random.default_rng(1).integers(0, 256, shape, dtype=np.uint8)
     wanted = np.asarray(image.fromarray(picture).resize(size_px, image.Resampling.BILINEAR))
-    assert np.array_equal(place(picture, size_px, SMOOTH)[0], wanted)
+    assert np.array_equal(place(picture, size_px, LAYOUTS["detr"].preparation)[0], wanted)

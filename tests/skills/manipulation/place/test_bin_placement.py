@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from skills.api import Surface
-from skills.manipulation.place.bin import inside_heights, risen_cells
+from skills.manipulation.place.verification import inside_heights, risen_cells
 
 BIN = Surface("bin", ((0.0, 0.0), (0.46, 0.0), (0.46, 0.46), (0.0, 0.46)), 0.42, is_bin=True)
 XY = np.stack(np.meshgrid(np.arange(0.0, 0.46, 0.01), np.arange(0.0, 0.46, 0.01)), axis=-1).reshape(-1, 2)

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from skills.navigate.pass_request import PassRequest
+from skills.navigate.trip_planning import PassRequest
 from skills.robot import Pose2D
 
 KIM = SimpleNamespace(place_W=(1.0, 0.0))

@@ -1,0 +1,1 @@
+"""Tasks of commands, each a page of its own."""

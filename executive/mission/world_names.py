@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from executive.words.command import SPEAKER, START, TIME_UNITS_S, Command
+from executive.words.command import SPEAKER, START, Command
 from executive.words.knowledge import ANYBODY, EVERYTHING, Knowledge
-from executive.words.task import Part, basic
+from executive.words.task import Part
 from skills.api import ObjectKind
 from skills.inputs.errors import listing, suggestion
 from skills.relations import DOOR, ROBOT, Landmark, Relation, RelationKind
@@ -17,10 +17,9 @@ def unknown_names(command: Command, knowledge: Knowledge) -> Iterator[tuple[str,
     def unknown(kind: str, name: str, known: Sequence[str]) -> tuple[str, str]:
         return f"unknown {kind} {name!r}", suggestion(name, knowledge.spellings(known), shown=known)
 
-    waits = command.task == basic().wait and command.object is not None and command.object.name in TIME_UNITS_S
-    own = command.task is not None and command.task.object_is in (Part.PERSON, Part.NUMBER, Part.TEXT)
+    own = command.task is not None and command.task.object_is not in (Part.THING, Part.NOTHING)
     yield from _wrong_with_task(command, knowledge)
-    for key, item in (("take", command.item), ("object", None if waits or own else command.object)):
+    for key, item in (("take", command.item), ("object", None if own else command.object)):
         person = command.looks and item is not None and knowledge.somebody(item.name) is not None
         if item is not None and knowledge.object_name(item.name) is None and not person:
             yield key, *unknown("object", item.name, knowledge.object_names())
@@ -67,6 +66,11 @@ def _wrong_with_task(command: Command, knowledge: Knowledge) -> Iterator[tuple[s
     if person and person.name != SPEAKER and (person.attributes or knowledge.somebody(person.name) is None):
         known = (ANYBODY, SPEAKER, *knowledge.people)
         yield "object", f"unknown person {str(person)!r}", suggestion(person.name, known, shown=known)
+    if whom is not None and task.object_is in (Part.TIME, Part.NUMBER) and command.amount is None:
+        yield "object", f"'{whom}' is no {task.object_is.value}", 'write it in digits, as in "3" or "10 second"'
+    if whom is not None and task.object_is is Part.PLACE and knowledge.place(str(whom)) is None:
+        known = knowledge.place_names()
+        yield "object", f"unknown place '{whom}'", suggestion(str(whom), knowledge.spellings(known), shown=known)
     if command.item is not None and task.item_is is Part.NOTHING:
         hint = "take it there in a step of its own"
         yield "take", f"the {command.item} cannot be taken along by '{task.word}'", hint

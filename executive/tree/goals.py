@@ -122,8 +122,8 @@ def went_goal(command: Command, knowledge: Knowledge) -> GoalCondition:
 
 
 def room_region(place: str | None, knowledge: Knowledge) -> tuple[Region, ...]:
-    """Room of a place, as the only region; none without a known place."""
-    known = None if place is None else knowledge.place(place)
+    """Room of a place or of the start, as the only region; none without a known place."""
+    known = place if place in (None, START) else knowledge.place(place)
     return () if known is None else (Region(room := knowledge.room(known), knowledge.rooms[room]),)
 
 

@@ -18,7 +18,7 @@ from executive.tree.node import NodeSpec
 from executive.tree.nodes.guard import Condition
 from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.registry import missing_skill
-from executive.words.command import Command
+from executive.words.command import START, Command
 from executive.words.expression import Value
 from executive.words.goal import GoalCondition
 from executive.words.knowledge import ANYTHING, EVERYTHING, Knowledge
@@ -313,8 +313,8 @@ class PlanBuilder:
         return {"relations": meant} if meant else {}
 
     def place(self, name: str) -> str:
-        """Returns the known place that `name` means. Raises InputError when there is no such place."""
-        known = self.knowledge.place(name)
+        """Returns the known place that `name` means, or the room of the start. Raises InputError when there is none."""
+        known = self.knowledge.room(START) if name == START else self.knowledge.place(name)
         if known is None:
             raise self.error(f"the place '{name}' is not known", suggestion(name, self.knowledge.place_names()))
         return known

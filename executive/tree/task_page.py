@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from executive.words.task import Task
 from skills.inputs.errors import InputError
+from skills.inputs.plugins import PluginDefect, call_plugin
 
 if TYPE_CHECKING:
     from executive.tree.node import NodeSpec
@@ -43,12 +44,18 @@ def page_of(task: Task) -> TaskPage:
 def from_page(task: Task, method: str, call: Callable[[TaskPage], ResultT], *kinds: type) -> ResultT:
     """Returns what a `method` of a page gives, one of some kinds. Raises InputError for defects, naming the task."""
     try:
-        found = call(page_of(task))
+        found = call_plugin(lambda: call(page_of(task)))
         if isinstance(found, kinds):
             return found
         fault = f"it returns {found!r}"
-    except InputError:
-        raise
-    except Exception as defect:
-        fault = f"{type(defect).__name__}: {defect}"
-    raise InputError(f"the method '{method}' of {task.named} has a defect: {fault}"[:300], hint="repair its page")
+    except PluginDefect as defect:
+        if isinstance(defect.__cause__, InputError):
+            raise defect.__cause__ from None
+        fault = str(defect)
+    raise defective(task, method, fault)
+
+
+def defective(task: Task, method: str, fault: str) -> InputError:
+    """Builds the error for a `method` of a task's page that has a defect."""
+    what = f"the method '{method}' of {task.named} has a defect: {fault}"
+    return InputError(what[:300], hint=f"repair its page {type(task).__module__}")

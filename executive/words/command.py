@@ -14,6 +14,7 @@ from typing import Any, Final
 
 from executive.words.task import NOTHING, Part, Task, task_named
 from skills.api import ObjectKind
+from skills.quantities import Duration, Number, QuantityError, display_text, number_in, number_of
 from skills.relations import ORDERS, PARTS, Landmark, Relation, RelationKind
 
 _ATTRIBUTE: Final = re.compile(
@@ -29,6 +30,11 @@ SPEAKER: Final = "speaker"
 """Person who spoke to the robot, as the object of a task on people."""
 TIME_UNITS_S: Final = {"second": 1.0, "seconds": 1.0, "minute": 60.0, "minutes": 60.0, "hour": 3600.0, "hours": 3600.0}
 """Seconds of each time unit that a command to wait takes as its object: "do [wait] to [10 second]"."""
+NUMBERS: Final = (
+    *("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten"),
+    *("eleven", "twelve", "thirteen", "fourteen", "fifteen", "sixteen", "seventeen", "eighteen", "nineteen", "twenty"),
+)
+_TIME: Final = re.compile(rf"(?:\d+ )?(?:{'|'.join(TIME_UNITS_S)})")
 _PLURAL: Final = "some"
 _RESERVED: Final = re.compile(r'[\[\]"]|^\s|\s$|\s\s|[^\S ]|^$')
 _NO_ATTRIBUTE: Final = re.compile(rf"\d+|{_PLURAL}|.*\s.*")
@@ -109,6 +115,18 @@ class Command:
         return self.task is not None and self.task.object_is is Part.PERSON
 
     @property
+    def amount(self) -> float | None:
+        """Number that the object is, in seconds if the task is about a time; None for any other object."""
+        kind, name = self.task and self.task.object_is, str(self.object).lower()
+        if kind is not Part.NUMBER:
+            unit_s = TIME_UNITS_S.get(name) if kind is Part.TIME else None
+            return unit_s and unit_s * self.object_count
+        try:
+            return number_in(str(NUMBERS.index(name)) if name in NUMBERS else name, Number)
+        except QuantityError:
+            return None
+
+    @property
     def carried(self) -> ObjectKind | None:
         """Object that the robot carries; None if it carries none."""
         return self.object if self.puts and self.item is None else self.item
@@ -135,6 +153,27 @@ def is_attribute(word: str) -> bool:
 def may_be_attribute(word: str) -> bool:
     """Returns whether `word` can describe an object, like a colour: a single word that is no number."""
     return _NO_ATTRIBUTE.fullmatch(word) is None
+
+
+def object_text(kind: Part, value: Any) -> Any:
+    """Text in a command for the value that a file gives a task's object; a thing, a place or a person stays as it is.
+
+    Raises QuantityError for a time of no whole seconds, a number or a text that cannot be in a command.
+    """
+    if kind is Part.TIME and not _TIME.fullmatch(str(value)):
+        seconds = number_of(value, Duration)
+        if not seconds.is_integer():
+            raise QuantityError("should be whole seconds", f"it reads {display_text(value)} now")
+        return f"{seconds:.0f} second"
+    if kind is Part.NUMBER:
+        (number_in if isinstance(value, str) else number_of)(value, Number)
+        return str(value).strip()
+    if kind is not Part.TEXT or isinstance(value, bool) or not isinstance(value, str | int | float):
+        return value
+    text = " ".join(str(value).split()).removeprefix('"').removesuffix('"')
+    if _RESERVED.search(text):
+        raise QuantityError(f"{display_text(text)} cannot be in a command", "leave brackets and double quotes out")
+    return _counted_text(ObjectKind(text), 1)
 
 
 def parse_object(text: str) -> ObjectKind:

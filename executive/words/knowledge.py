@@ -11,6 +11,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import Field, model_validator
 
+from executive.words.command import NUMBERS, START
 from executive.words.outlines import Corner, Polygon, distance_m, unless_near
 from executive.words.robot_config import RobotsFile, check_name
 from executive.words.task import Task, basic, installed_tasks
@@ -200,10 +201,10 @@ class Knowledge(Strict):
         return _resolve(name, self.places) or _resolve(name, self.surfaces)
 
     def room(self, place: str) -> str:
-        """Room that contains a known place, or is nearest to a named pose; a room contains itself."""
+        """Room that contains a known place, or is nearest to a named pose or the start; a room contains itself."""
         if place in self.surfaces:
             return self.surfaces[place].place
-        rooms, pose = self.rooms, self.places[place].pose
+        rooms, pose = self.rooms, self.start if place == START else self.places[place].pose
         return place if place in rooms else min(rooms, key=lambda name: distance_m(rooms[name], (pose.x, pose.y)))
 
     @property
@@ -307,10 +308,6 @@ def spoken_forms(name: str) -> tuple[str, ...]:
     return tuple(form for form in forms if form and form != name.lower())
 
 
-NUMBERS: Final = (
-    *("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten"),
-    *("eleven", "twelve", "thirteen", "fourteen", "fifteen", "sixteen", "seventeen", "eighteen", "nineteen", "twenty"),
-)
 _EXCEPT: Final = " except "
 
 

@@ -12,18 +12,19 @@ from pydantic import (
     PrivateAttr,
     SerializerFunctionWrapHandler,
     StrictBool,
+    ValidationInfo,
     model_serializer,
     model_validator,
 )
 
-from executive.words.command import Command, command_of_parts, parts_of_command
+from executive.words.command import Command, command_of_parts, object_text, parts_of_command
 from executive.words.condition import Condition, DoorOpen
 from executive.words.expression import Expression, Template, literal
 from executive.words.phrase import Goal, ObjectWords, written
 from executive.words.step import Fault, Scalar, Step, unreadable
 from executive.words.task import Part, Task
 from skills.inputs.schema import Name, Strict, Text
-from skills.quantities import Duration, QuantityError, Share, clock_text
+from skills.quantities import Duration, Number, QuantityError, Share, clock_text
 
 COMMAND_KEYS: Final = ("take", "to", "do", "object")
 _ELSEWHERE: Final = (
@@ -54,6 +55,12 @@ class Say(Step):
         return copy
 
 
+def _of_kind(value: Any, info: ValidationInfo) -> Any:
+    """Text of an object by the kind that its task says."""
+    task = info.data.get("do")
+    return value if task is None or value is None else object_text(task.object_is, value)
+
+
 class Do(Step):
     """Step with one command, written as its parts."""
 
@@ -62,8 +69,12 @@ class Do(Step):
         default=None, description='The place or person, or "start", or "Robin at hall"; or a spot on a surface.'
     )
     do: Task | None = Field(default=None, description="The task there, on the object.")
-    object: ObjectWords | None = Field(
-        default=None, description='The object of the task, or a person: a name, "person" for anybody, or "speaker".'
+    object: Annotated[
+        ObjectWords | None, BeforeValidator(_of_kind, json_schema_input_type=ObjectWords | Number | None)
+    ] = Field(
+        default=None,
+        description='The object of the task, or a person: a name, "person" for anybody, or "speaker"; or, as the task '
+        'says, a time (seconds, or "10 min"), a number or a text.',
     )
     elsewhere: StrictBool | None = Field(default=None, description=_ELSEWHERE)
     gives: dict[str, Name] | None = Field(default=None, description=_GIVES)

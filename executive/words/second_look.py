@@ -11,8 +11,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
-from executive.words.command import START, Command
-from executive.words.knowledge import NUMBERS, Knowledge
+from executive.words.command import NUMBERS, START, Command
+from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Dock, Picture, Speak, Wait
 from executive.words.step import Step
 from executive.words.steps import steps_to_yaml

@@ -42,7 +42,7 @@ from executive.words.leaf_steps import (
     steps_of_commands,
 )
 from executive.words.step import Fault, Scalar, Step, unreadable
-from executive.words.task import Part, installed_tasks
+from executive.words.task import Part, is_task, task_named
 from executive.words.zone import ZONES, Zones
 from skills.inputs.errors import InputError, listing
 from skills.inputs.schema import Name, Strict, Text
@@ -353,6 +353,7 @@ def _read(data: Any) -> Any:
     return _FORMS.read(data)
 
 
+_PLAIN_KINDS: Final = (Part.TIME, Part.NUMBER, Part.TEXT)
 _PARTS: Final = MappingProxyType({"task": "do", "item": "take", "goal": "to", "object": "object"})
 """Parts of a command as a task names them, with the keys of a step."""
 
@@ -362,22 +363,27 @@ def _as_command(data: Mapping[Any, Any]) -> Mapping[Any, Any]:
 
     The text of the short form is the task's object, or its goal when the task has no object.
     """
-    words = [key for key in data if key in installed_tasks() and key not in _KEYS]
+    words = [key for key in data if key not in _KEYS and is_task(key)]
     said = {key: value for key, value in data.items() if key not in words and key != "do"}
-    if len(words) == 1 and "do" not in data:
+    if len(words) + ("do" in data) > 1:
+        raise ValueError(_refused([*words, *(["do"] if "do" in data else [])]))
+    if words:
         (word,) = words
-        task = installed_tasks()[word]
+        task, given = task_named(word), data[word]
         main, kind = ("goal", task.goal_is) if task.object_is is Part.NOTHING else ("object", task.object_is)
-        if not isinstance(data[word], Mapping | None if kind is Part.NOTHING else str | Mapping | None):
+        fitting = None if kind is Part.NOTHING else str | int | float if kind in _PLAIN_KINDS else str
+        if isinstance(given, bool) or not isinstance(given, Mapping | None | fitting):
             how = "leave its value out" if kind is Part.NOTHING else "write it as a text, in quotes"
             raise QuantityError(f"'{word}' takes {'no value' if kind is Part.NOTHING else f'a {kind.value}'}", how)
-        parts = {"task": word, **(data[word] if isinstance(data[word], Mapping) else {main: data[word]})}
-    elif not words and isinstance(data.get("do"), Mapping) and "task" in data["do"]:
+        parts = {"task": word, **(given if isinstance(given, Mapping) else {main: given})}
+    elif isinstance(data.get("do"), Mapping) and "task" in data["do"]:
         parts = dict(data["do"])
     else:
         return data
     named = {_PARTS.get(key, key): value for key, value in parts.items() if value is not None}
-    return {**named, **said} if named.keys().isdisjoint(said) else data
+    if twice := [key for key in said if key in named]:
+        raise QuantityError(f"'{twice[0]}' of '{named['do']}' is said twice", "say it once")
+    return {**named, **said}
 
 
 if not TYPE_CHECKING:

@@ -14,11 +14,20 @@ from importlib.metadata import EntryPoint
 from types import MappingProxyType
 from typing import Any, ClassVar, Final
 
-from pydantic_core import PydanticCustomError, PydanticKnownError, core_schema
+from pydantic_core import PydanticKnownError, core_schema
 
 from executive.words.goal import GoalCondition
 from skills.inputs.errors import InputError, listing
-from skills.inputs.plugins import OURS, TASKS, PluginDefect, distribution_of, installed_plugins, run_plugin
+from skills.inputs.plugins import (
+    OURS,
+    TASKS,
+    PluginDefect,
+    distribution_of,
+    installed_plugins,
+    missing_plugin,
+    run_plugin,
+)
+from skills.quantities import QuantityError
 
 NOTHING: Final = "Nothing"
 
@@ -110,11 +119,9 @@ class Task:
         def read(value: Any) -> Task:
             if isinstance(value, Task):
                 return value
-            if isinstance(value, str) and value in broken_tasks():
-                raise PydanticCustomError("task", "{why}", {"why": str(broken_tasks()[value])})
-            if not isinstance(value, str) or value not in installed_tasks():
+            if not is_task(value):
                 raise PydanticKnownError("enum", {"expected": listing(map(repr, installed_tasks()), last="or")})
-            return installed_tasks()[value]
+            return task_named(value)
 
         as_word = core_schema.plain_serializer_function_ser_schema(lambda task: task.word, when_used="json")
         return core_schema.no_info_plain_validator_function(read, serialization=as_word)
@@ -125,12 +132,22 @@ class Task:
 
 
 def task_named(word: object) -> Task:
-    """Returns the task of a word. Raises ValueError for a word that no installed task has."""
-    if isinstance(word, str) and word in installed_tasks():
-        return installed_tasks()[word]
-    if isinstance(word, str) and word in broken_tasks():
-        raise ValueError(str(broken_tasks()[word]))
-    raise ValueError(f"[{word}] is no task; known are {', '.join(installed_tasks())} and {NOTHING}")
+    """Returns the task of a word. Raises QuantityError for a word that no installed task has."""
+    if word in installed_tasks():
+        return installed_tasks()[str(word)]
+    known = f"known are {', '.join(installed_tasks())} and {NOTHING}"
+    raise QuantityError(*_missing(word) or (f"[{word}] is no task", known))
+
+
+def is_task(word: object) -> bool:
+    """Returns whether a word is a task, also one that cannot be used or whose plug-in is not installed."""
+    return isinstance(word, str) and (word in installed_tasks() or _missing(word) is not None)
+
+
+def _missing(word: object) -> tuple[str, str] | None:
+    """Message and hint for the word of a task that cannot be used, or whose plug-in is not installed."""
+    broken = broken_tasks().get(str(word))
+    return missing_plugin(TASKS, str(word)) if broken is None else (broken.message, broken.hint)
 
 
 def installed_tasks() -> Mapping[str, Task]:

@@ -18,6 +18,7 @@ from plant.referee.findings import (
 )
 from plant.referee.object_history import ON_TRAY_GAP_S, SETTLE_S, Lift, ObjectHistory, TimedPath, Truth
 from skills.inputs.errors import definite, listing
+from skills.inputs.plugins import PluginDefect, call_plugin
 from skills.robot import FloatArray
 
 PERSON = "person"
@@ -347,11 +348,11 @@ def _judge_own(condition: GoalCondition, truth: Truth) -> Finding:
     """Judges a condition by the page of its task; one that it cannot judge does not hold."""
     task = task_named(condition.task)
     try:
-        holds, sentence = task.judge(condition, truth)
+        holds, sentence = call_plugin(lambda: task.judge(condition, truth))
         if holds not in (True, False) or not (isinstance(sentence, str) and sentence):
             raise TypeError("it returns no pair of True or False and a sentence")
-    except Exception as defect:
-        return Finding(False, f"{task.named} cannot judge it ({type(defect).__name__}: {defect}).")
+    except (PluginDefect, TypeError, ValueError) as defect:
+        return Finding(False, f"{task.named} cannot judge it ({defect}).")
     return Finding(bool(holds), sentence)
 
 

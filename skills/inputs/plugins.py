@@ -69,6 +69,16 @@ def _all_installed() -> SelectableGroups:
     return entry_points()
 
 
+@cache
+def missing_plugin(group: str, name: str) -> tuple[str, str] | None:
+    """Message and hint for a name that only a plug-in of this project registers, which is missing; None for others."""
+    from skills.inputs.yaml_source import read_yaml
+
+    table = read_yaml(Path(__file__).with_name("plugins.yaml")).data
+    owner = next((each for each, groups in table.items() if name in groups.get(group, ())), None)
+    return owner and (f"'{name}' needs the plug-in {owner}, which is not installed", f"pip install {owner}")
+
+
 def class_tables(name: str) -> Iterator[tuple[Path, Any]]:
     """Yields path and data of the YAML file `name` from each package with object classes. Raises InputError."""
     from skills.inputs.yaml_source import read_yaml
@@ -112,9 +122,14 @@ def run_plugin(entry: EntryPoint, call: Callable[[], ResultT], *, limit_s: float
     since an import cannot be interrupted. Raises PluginDefect when the code raises anything but a plain
     KeyboardInterrupt, which is the user's.
     """
+    with _ended_after(entry, limit_s):
+        return call_plugin(call)
+
+
+def call_plugin(call: Callable[[], ResultT]) -> ResultT:
+    """Calls the code of a plug-in, without a time limit. Raises PluginDefect like `run_plugin`."""
     try:
-        with _ended_after(entry, limit_s):
-            return call()
+        return call()
     except BaseException as defect:
         if type(defect) is KeyboardInterrupt:
             raise

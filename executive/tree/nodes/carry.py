@@ -149,9 +149,8 @@ def person_pose(builder: PlanBuilder, person: str, at: str | None) -> Pose2D:
 def _person_at_start(builder: PlanBuilder) -> str:
     """Name of the only person whose place is in the start's room; "somebody" if there are none or several."""
     knowledge = builder.knowledge
-    start = (knowledge.start.x, knowledge.start.y)
-    rooms = [name for name, outline in knowledge.rooms.items() if inside(outline, start)]
-    there = [name for name, facts in knowledge.people.items() if knowledge.room(builder.place(facts.at)) in rooms]
+    rooms = {name: knowledge.room(builder.place(facts.at)) for name, facts in knowledge.people.items()}
+    there = [name for name, room in rooms.items() if room == knowledge.room(START)]
     return there[0] if len(there) == 1 else "somebody"
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 from executive.tree.goals import went_goal
 from executive.tree.task_page import TaskPage
-from executive.words.command import TIME_UNITS_S, Command
+from executive.words.command import Command
 from executive.words.goal import GoalCondition
 from executive.words.knowledge import Knowledge
 from executive.words.task import Part
@@ -36,8 +36,7 @@ class Wait(TaskPage):
             raise builder.error(
                 f"the {command.item} cannot be carried by waiting", "take it there in a step of its own"
             )
-        unit = TIME_UNITS_S.get("" if command.object is None else command.object.name)
-        duration_s = 0.0 if unit is None else unit * command.object_count
+        duration_s = command.amount or 0.0
         if not 0.0 < duration_s <= LONGEST_WAIT_S:
             what = "a wait lasts a day at most" if duration_s else "it is not said for how long to wait"
             raise builder.error(what, 'name a time up to a day, such as "10 seconds"')

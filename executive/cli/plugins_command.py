@@ -6,7 +6,7 @@ import os
 import re
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import EntryPoint, version
 from multiprocessing import get_context
 from pathlib import Path
@@ -15,11 +15,15 @@ from typing import Annotated, Final
 
 import typer
 
+from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.cli.entry import COMMANDS, COMMANDS_GROUP, as_command, shipped_command
 from executive.cli.number_options import quantity_option
 from executive.cli.options import AS_JSON, takes_request
 from executive.cli.output import console_for, finish, progress_bar, show_table
+from executive.language.parser import load_parser
+from executive.language.questions import RefusalKind
 from executive.language.task_sentences import other_readings, sentence_faults
+from executive.language.understand import understand
 from executive.mission.load import load_stack
 from executive.mission.request import Request
 from executive.store import trigger_source
@@ -46,7 +50,10 @@ _FORKS: Final = get_context("forkserver")
 
 @dataclass(frozen=True)
 class Plugin:
-    """Entry point of another distribution; `broken` says why it cannot be used (None: it can be used)."""
+    """Entry point of another distribution; `broken` says why it cannot be used (None: it can be used).
+
+    `sample` is a sentence of a task that is understood.
+    """
 
     group: str
     name: str
@@ -54,6 +61,7 @@ class Plugin:
     version: str
     value: str
     broken: str | None = None
+    sample: str | None = None
 
 
 def plugins(
@@ -66,7 +74,7 @@ def plugins(
     console, found = console_for(as_json), list[Plugin]()
     with ThreadPoolExecutor(_WORKERS) as pool, progress_bar(console, "plug-ins", len(entries)) as advance:
         for each in pool.map(lambda entry: _checked(entry, limit), entries):
-            found.append(each)
+            found.append(_with_sample(each) if each.group == loading.TASKS and not each.broken else each)
             advance()
     show_table(console, ("distribution", "version", "group", "name", "value", ""), list(_rows(found)))
     finish({"plugins": [asdict(each) for each in found]}, as_json, good=not any(each.broken for each in found))
@@ -92,8 +100,7 @@ def _rows(found: Sequence[Plugin]) -> Iterator[tuple[str, ...]]:
     last = ""
     for each in sorted(found, key=lambda each: each.distribution):
         named = (each.distribution, each.version) if each.distribution != last else ("", "")
-        task = installed_tasks().get(each.name) if each.group == loading.TASKS and not each.broken else None
-        used = "can be used" if task is None or not task.samples else f'"{task.samples[0]}"'
+        used = f'"{each.sample}"' if each.sample else "can be used"
         yield (*named, each.group, each.name, each.value, each.broken or used)
         last = each.distribution
 
@@ -185,6 +192,26 @@ def _load(entry: EntryPoint, limit_s: float) -> None:
         raise InputError(f"'{entry.name}' is no scheme in lower case")
     if entry.group in loading.FUNCTIONS and not callable(used):
         raise InputError(f"{entry.value} is no function")
+
+
+def _with_sample(plugin: Plugin) -> Plugin:
+    """Adds the first sample of a task that is understood in the world `flat`, or one that names what is not there.
+
+    The task is broken if all its samples are refused.
+    """
+    task, best = installed_tasks()[plugin.name], plugin
+    parser, flat = load_parser(), knowledge_of(open_world("flat"))
+    for sample in task.samples:
+        meant = understand(sample, parser=parser, knowledge=flat, require_wake=False)
+        tasks = {command.task for one in meant.all_steps for step in one.walk() for command in step.commands}
+        if task in tasks or (tasks and not task.sentences):
+            return replace(plugin, sample=sample)
+        if meant.refused_as is RefusalKind.OTHER and meant.unknown_words:
+            best = best if best.sample else replace(plugin, sample=sample)
+        elif best == plugin:
+            why = f"is refused: {meant.reason}" if meant.reason else "has another meaning"
+            best = replace(plugin, broken=f"its sample '{sample}' {why}; give it other words")
+    return best
 
 
 stack = typer.Typer(

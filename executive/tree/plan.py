@@ -5,16 +5,16 @@ The methods of `PlanBuilder` from `sequence` to `navigate` are the shapes of whi
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, dataclass, fields, replace
 from types import MappingProxyType
 from typing import Any, Final
 
 from executive.mission.gripper import InGripper
 from executive.mission.world_names import in_world
 from executive.tree.board import Constant, FromBoard, LastKnown
-from executive.tree.node import NodeSpec
+from executive.tree.context import RunContext
+from executive.tree.node import NodeSpec, node_classes
 from executive.tree.nodes.guard import Condition
 from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.registry import missing_skill
@@ -79,6 +79,26 @@ class Assembled:
         """Node of an assembly that has exactly one node."""
         (node,) = self.nodes
         return node
+
+
+def plan_faults(plan: NodeSpec) -> Iterator[str]:
+    """Yields the faults of a plan's nodes by which its tree cannot be built; none behind one of an unknown kind."""
+    seen, given = set[str](), {"path_id", "name", "context", *(each.name for each in fields(RunContext))}
+    for node in plan.walk():
+        behaviour = node_classes().get(node.kind) if isinstance(node, NodeSpec) else None
+        if behaviour is None:
+            yield f"there is no node of kind '{node.kind}'" if isinstance(node, NodeSpec) else f"{node!r} is no node"
+            return
+        named, known = f"the {node.kind} '{node.name}'", {each.name: each for each in fields(behaviour) if each.init}
+        needed = {name for name, each in known.items() if each.default is MISSING is each.default_factory} - given
+        if needed & {"child", "children"} and not node.children:
+            yield f"{named} has no steps"
+        lacks = needed - {"child", "children"} - node.options.keys()
+        yield from (f"{named} lacks the option '{each}'" for each in sorted(lacks))
+        yield from (f"{named} has no option '{each}'" for each in node.options if each not in known)
+        if node.path_id in seen:
+            yield f"two nodes have the path id '{node.path_id}'; build one below another, by builder.at"
+        seen.add(node.path_id)
 
 
 @dataclass(frozen=True)
@@ -290,7 +310,7 @@ class PlanBuilder:
         kind = self.registry.get(skill)
         if kind is None:
             return False
-        known = {field.name for field in dataclasses.fields(kind.Inputs)}
+        known = {field.name for field in fields(kind.Inputs)}
         return known.issuperset(inputs) and set(kind.outputs).issuperset(outputs)
 
     def optional_ports(self, skill: str, inputs: Mapping[str, object]) -> dict[str, object]:

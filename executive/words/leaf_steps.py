@@ -56,8 +56,8 @@ class Say(Step):
 
 
 def _of_kind(value: Any, info: ValidationInfo) -> Any:
-    """Text of an object by the kind that its task says."""
-    task = info.data.get("do")
+    """Text of an object by the kind that its task says; that of a command, in the context, stays."""
+    task = None if info.context else info.data.get("do")
     return value if task is None or value is None else object_text(task.object_is, value)
 
 
@@ -92,7 +92,7 @@ class Do(Step):
     @classmethod
     def from_command(cls, command: Command) -> Do:
         """Builds the step for a command, and keeps the command's verb."""
-        step = cls.model_validate(written(parts_of_command(command)))
+        step = cls.model_validate(written(parts_of_command(command)), context=command)
         step.__dict__["command"] = command
         return step
 

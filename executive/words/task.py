@@ -215,7 +215,7 @@ def _faults(kind: Any, word: str) -> Iterator[tuple[str, str]]:
         yield "its rows of unkept words have no expression 'said' with a 'reason'", "see executive.words.task.Task"
     for name, (what, usual) in _FACTS.items():
         given = getattr(kind, name)
-        texts = [*given.items()] if what is Mapping and isinstance(given, Mapping) else [("", "")]
+        texts = given.items() if isinstance(given, Mapping) else [given] if isinstance(given, tuple) else []
         if not isinstance(given, what) or not all(isinstance(each, str) for pair in texts for each in pair):
             yield f"its {name} is {str(given)[:60]!r}", f"write {usual}, for instance"
     if missing := getattr(kind, "__abstractmethods__", ()):
@@ -227,7 +227,8 @@ _FACTS: Final[Mapping[str, tuple[Any, str]]] = {
     "past": (Mapping, "{'swept': 'sweep'}"),
     "ability": (str, "'sweep floors'"),
     "number": (int, "255"),
-    "answers": (bool, "True"),
+    "spoken": (tuple, "('sweep the hall',)"),
+    **dict.fromkeys(("needs_goal", "several", "answers"), (bool, "True")),
 }
 """Facts of a page by name: their types, and an example."""
 

@@ -22,8 +22,8 @@ from executive.tree.nodes.search import (
     surfaces_elsewhere,
     surfaces_first_known,
 )
-from executive.tree.plan import Assembled, PlanBuilder, StepPart
-from executive.tree.task_page import from_page
+from executive.tree.plan import Assembled, PlanBuilder, StepPart, plan_faults
+from executive.tree.task_page import defective, from_page
 from executive.words.command import START, Command
 from executive.words.goal import GoalCondition, When
 from executive.words.knowledge import Knowledge
@@ -170,7 +170,10 @@ def task_plan(task: Task, builder: PlanBuilder) -> NodeSpec:
     for value, part, name in given:
         if value is not None and part is Part.NOTHING:
             raise builder.error(f"'{task.word}' takes no {name}, as in '{value}'", "leave it out")
-    return from_page(task, "plan", lambda page: page.plan(builder), NodeSpec)
+    node = from_page(task, "plan", lambda page: page.plan(builder), NodeSpec)
+    for fault in plan_faults(node):
+        raise defective(task, "plan", fault)
+    return node
 
 
 def go_to_goal(builder: PlanBuilder) -> NodeSpec:

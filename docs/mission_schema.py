@@ -5,8 +5,9 @@ from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, Final, get_type_hints
 
-from executive.words.leaf_steps import COMMAND_KEYS, Dock
+from executive.words.leaf_steps import Dock
 from executive.words.mission import Mission
+from executive.words.steps import add_tasks
 from skills.quantities import base_type, bounds, unitless_name
 
 _NO_SKILLS: Final[Mapping[str, type]] = MappingProxyType({})
@@ -23,7 +24,7 @@ def mission_json_schema(inputs: Mapping[str, type] = _NO_SKILLS) -> dict[str, An
     described["required"] = [key for key in described["required"] if key != "steps"]
     described["anyOf"] = [{"required": [key]} for key in ("steps", "parts")]
     steps["Dock"]["required"] = [Dock.key]
-    steps["Do"]["anyOf"] = [{"required": [key]} for key in COMMAND_KEYS]
+    add_tasks(steps["Do"])
     steps["CallSkill"]["allOf"] = [
         {
             "if": {"properties": {"skill": {"const": name}}, "required": ["skill"]},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 from typing import Annotated, Final
@@ -10,8 +11,10 @@ import typer
 
 from executive.app.prepare.mission_files import FOLDER, shipped_missions
 from executive.cli.output import console_for, show_table
+from executive.words.steps import add_tasks
 from skills.inputs.outside import writing
 
+_SCHEMA: Final = "mission.schema.json"
 _FOR_EDITORS: Final = "# yaml-language-server"
 
 
@@ -24,12 +27,16 @@ def missions() -> None:
 def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder for the missions.", show_default=False)],
 ) -> None:
-    """Copies the missions that come with Errand into a folder; existing files stay."""
+    """Copies the missions that come with Errand, and their schema with the installed tasks; existing missions stay."""
     with writing(folder, "name another folder"):
         folder.mkdir(parents=True, exist_ok=True)
         new = [file for file in sorted(FOLDER.glob("*.[yj]*")) if not (folder / file.name).exists()]
         for file in new:
             shutil.copyfile(file, folder / file.name)
+        schema = json.loads((FOLDER / _SCHEMA).read_text(encoding="utf-8"))
+        add_tasks(schema["$defs"]["Do"])
+        text = json.dumps(schema, indent=2, ensure_ascii=False)
+        (folder / _SCHEMA).write_text(f"{text}\n", encoding="utf-8")
     first = folder / next(iter(shipped_missions().values())).name
     console_for(as_json=False).print(f"{len(new)} files in {folder}; try: errand run {first}", markup=False)
 

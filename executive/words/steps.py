@@ -42,7 +42,7 @@ from executive.words.leaf_steps import (
     steps_of_commands,
 )
 from executive.words.step import Fault, Scalar, Step, unreadable
-from executive.words.task import Part, is_task, task_named
+from executive.words.task import Part, Task, installed_tasks, is_task, task_named
 from executive.words.zone import ZONES, Zones
 from skills.inputs.errors import InputError, listing
 from skills.inputs.schema import Name, Strict, Text
@@ -370,7 +370,7 @@ def _as_command(data: Mapping[Any, Any]) -> Mapping[Any, Any]:
     if words:
         (word,) = words
         task, given = task_named(word), data[word]
-        main, kind = ("goal", task.goal_is) if task.object_is is Part.NOTHING else ("object", task.object_is)
+        main, kind = _main_part(task)
         fitting = None if kind is Part.NOTHING else str | int | float if kind in _PLAIN_KINDS else str
         if isinstance(given, bool) or not isinstance(given, Mapping | None | fitting):
             how = "leave its value out" if kind is Part.NOTHING else "write it as a text, in quotes"
@@ -384,6 +384,25 @@ def _as_command(data: Mapping[Any, Any]) -> Mapping[Any, Any]:
     if twice := [key for key in said if key in named]:
         raise QuantityError(f"'{twice[0]}' of '{named['do']}' is said twice", "say it once")
     return {**named, **said}
+
+
+def add_tasks(do: dict[str, Any]) -> None:
+    """Adds both forms of each installed task to the JSON schema of a command, `Do`."""
+    keys, short = do["properties"], [task for task in installed_tasks().values() if task.word not in _KEYS]
+    own = {key: {"$ref": f"#/$defs/Do/properties/{key}"} for key in COMMAND_KEYS}
+    parts = {part: own[key] for part, key in _PARTS.items() if part != "task"}
+    word = {"type": "string", "anyOf": [{"enum": [*installed_tasks()]}, {"pattern": r"^\$\{"}]}
+    form = {"type": "object", "properties": parts, "additionalProperties": False}
+    whole = {**form, "properties": {"task": word, **parts}, "required": ["task"]}
+    keys["do"] = {**keys["do"], "anyOf": [word, whole, {"type": "null"}]}
+    for task in short:
+        keys[task.word] = {"anyOf": [own[_main_part(task)[0]], form], "description": task.about}
+    do["anyOf"] = [{"required": [key]} for key in (*COMMAND_KEYS, *(task.word for task in short))]
+
+
+def _main_part(task: Task) -> tuple[str, Part]:
+    """Key and kind of the part that the short form of a task holds: its object, or its goal without an object."""
+    return ("to", task.goal_is) if task.object_is is Part.NOTHING else ("object", task.object_is)
 
 
 if not TYPE_CHECKING:

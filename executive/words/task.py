@@ -89,6 +89,11 @@ class Task:
         return tuple(sample for row in self.sentences for sample in row["samples"]) or self.spoken
 
     @property
+    def about(self) -> str:
+        """First line of its docstring."""
+        return (type(self).__doc__ or "").strip().partition("\n")[0]
+
+    @property
     def named(self) -> str:
         """Name with the distribution that registers the task."""
         return f"task '{self.word}' of {self.owner or 'an unknown distribution'}"

@@ -14,8 +14,8 @@ from executive.run.outcome import Execution, Finding, Said
 from executive.tree.behaviour import Explained
 from executive.tree.board import Board
 from executive.tree.compiler import CompiledTree
+from executive.tree.context import ANSWER_TOPIC
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.words.goal import GoalKind
 from executive.words.schemas import DETECTIONS, SPEECH
 from executive.words.slug import slug

@@ -14,6 +14,7 @@ from skills.api import Part, Skill, SkillContext
 from skills.robot import Pose2D
 from skills.world_model import ExcludesRobots
 
+ANSWER_TOPIC: Final = "answer"
 DAY_S: Final = 86_400.0
 
 
@@ -103,4 +104,9 @@ class RunContext(SkillContext):
     def for_skill(self, path_id: str) -> SkillContext:
         """Returns those parts of the context that a skill may use, with a seed of the skill's own."""
         lent = {each.name: getattr(self, each.name) for each in fields(SkillContext)}
-        return SkillContext(**{**lent, "seed": leaf_seed(self.seed, path_id)})
+        blank = {"node": path_id, "question": "", "answer": None, "message": ""}
+
+        def publish(topic: str, message: Mapping[str, Any]) -> None:
+            self.publish(topic, {**blank, **message} if topic == ANSWER_TOPIC else message)
+
+        return SkillContext(**{**lent, "seed": leaf_seed(self.seed, path_id), "publish": publish})

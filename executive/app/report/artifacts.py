@@ -16,7 +16,7 @@ import numpy as np
 
 from executive.record.history import Event
 from executive.run.visitor import RunVisitor
-from executive.tree.nodes.search import ANSWER_TOPIC
+from executive.tree.context import ANSWER_TOPIC
 from executive.view.map_picture import newest_zones
 from executive.view.text import ROBOT_COLOURS, rgb_of
 from executive.words.schemas import ACTIVITY, DESTINATION, TRANSITIONS, TREE

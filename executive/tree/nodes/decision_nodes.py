@@ -14,13 +14,13 @@ from py_trees.common import Status
 from executive.mission.certainty import refuse_certain
 from executive.tree.assembly import Assembler, Flow, StepPlans
 from executive.tree.behaviour import ExplainedDecorator, MemoryComposite, cause_of, message_of
-from executive.tree.context import DAY_S, RunContext
+from executive.tree.context import ANSWER_TOPIC, DAY_S, RunContext
 from executive.tree.goals import command_goal, door_goal
 from executive.tree.node import NodeSpec
 from executive.tree.nodes import guard
 from executive.tree.nodes.door_check import door_plan
 from executive.tree.nodes.guard import Verdict, Waiting
-from executive.tree.nodes.search import ANSWER_TOPIC, find_plan, refuse_several
+from executive.tree.nodes.search import find_plan, refuse_several
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words import leaf_steps as model
 from executive.words.condition import (

@@ -12,9 +12,10 @@ from py_trees.common import Status
 from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import ExplainedDecorator
 from executive.tree.board import FromBoard
+from executive.tree.context import ANSWER_TOPIC
 from executive.tree.goals import POSE_NEAR_M, square_region
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.search import ANSWER_TOPIC, search_plan
+from executive.tree.nodes.search import search_plan
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words.command import parse_object
 from executive.words.goal import GoalCondition, GoalKind, Region, When

@@ -10,6 +10,7 @@ from py_trees.common import Status
 
 from executive.tree.behaviour import Explained, ExplainedDecorator
 from executive.tree.board import Board, FromBoard, SurfaceOfDetection
+from executive.tree.context import ANSWER_TOPIC
 from executive.tree.goals import surfaces_left_out, surfaces_to_search
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.aside import floor_square
@@ -31,7 +32,6 @@ from skills.geometry import compose
 from skills.inputs.errors import listing, with_article
 from skills.robot import Pose2D
 
-ANSWER_TOPIC: Final = "answer"
 Ports = Mapping[str, object]
 
 NO_PORTS: Final[Ports] = MappingProxyType({})

@@ -11,10 +11,9 @@ from py_trees.common import Status
 from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import ExplainedLeaf
 from executive.tree.board import FromBoard
-from executive.tree.context import RunContext
+from executive.tree.context import ANSWER_TOPIC, RunContext
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.decision_nodes import Keys, Values, View
-from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.tree.nodes.values import set_plan
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words import steps as model

@@ -176,7 +176,7 @@ class ReadNumber(TaskPage):
 
     made: ClassVar[Mapping[str, str]] = {"meter": "407"}
     """What the display at each place was made with, for the judge alone."""
-    word = "read"
+    word, answers = "read", True
     goal_is, needs_goal = Part.PLACE, True
     sentences = (
         {"template": "read [the number (of|on|at)] [{place:goal}]", "samples": ["read the number of the desk"]},

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from executive.tree.context import ANSWER_TOPIC
 from executive.tree.nodes.decision_nodes import Check, Decide, Decision, MustHold, MustNotBegin, View
 from executive.tree.nodes.guard import Waiting
-from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.tree.nodes.values import SetValues
 from executive.tree.nodes.wait import Pause, WaitFor, WaitUntilClock
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, Look, Not, ValueIs

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from executive.run.control import Control
-from executive.tree.nodes.search import ANSWER_TOPIC
+from executive.tree.context import ANSWER_TOPIC
 from executive.tree.nodes.speech import SPEECH_TOPIC, AskPeople
 from executive.words.expression import Template
 from skills.api import Cause

@@ -10,24 +10,10 @@ from executive.words.goal import GoalCondition, GoalKind, Region, When
 from plant.referee.judge import judge
 from plant.referee.object_history import PATH_STEP_M, TakenPicture, TimedPath, Truth, extend_path
 from skills.robot import Intrinsics
+from tests.plant.referee.paths import finding, path, walked
 
 OFFICE = Region("office", ((8.0, -2.0), (12.0, -2.0), (12.0, 2.0), (8.0, 2.0)))
 HALL = Region("hall", ((-2.0, -2.0), (4.0, -2.0), (4.0, 2.0), (-2.0, 2.0)))
-
-
-def path(*points):
-    """Path through points (x, y, t)."""
-    return TimedPath(np.array([(x, y, 0.0, t) for x, y, t in points], dtype=np.float64))
-
-
-def walked(x_from, x_to, from_s=0.0, y=0.0, speed_m_s=1.0):
-    """Path along x at a speed."""
-    along = np.arange(x_from, x_to, 0.1)
-    return path(*((x, y, from_s + (x - x_from) / speed_m_s) for x in along))
-
-
-def finding(condition, robot, **people):
-    return judge([condition], Truth(60.0, (), {"alice": robot}, people, {}), collisions=())
 
 
 def test_a_robot_beside_the_person_has_met_them_where_they_were_then():

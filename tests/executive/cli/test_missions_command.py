@@ -1,11 +1,15 @@
 """Shipped missions by name, from any folder."""
 
+import json
 from pathlib import Path
 
 import pytest
+from jsonschema import Draft202012Validator
 
 from executive.app.prepare.mission_files import mission_file, shipped_missions
+from executive.cli.missions_command import init
 from skills.inputs.errors import InputError
+from skills.inputs.yaml_source import parse_yaml
 from tests.executive.cli.calls import done, errand
 
 MISSIONS = Path(__file__).parents[3] / "missions"
@@ -57,3 +61,23 @@ def test_init_copies_the_missions_and_overwrites_nothing(elsewhere):
     assert {file.stem for file in (elsewhere / "mine").glob("*.yaml")} == set(shipped_missions())
     assert (elsewhere / "mine" / "mission.schema.json").read_bytes() == (MISSIONS / "mission.schema.json").read_bytes()
     assert (elsewhere / "mine" / "patrol.yaml").read_text() == "name: mine\n"
+
+
+#   a step, and whether the schema takes it
+@pytest.mark.parametrize(
+    ("step", "fits"),
+    [
+        ("vacuum: kitchen", True),
+        ("water: {object: beer, goal: desk}", True),
+        ("do: {task: call, object: 3}", True),
+        ("{do: vacuum, to: hall}", True),
+        ("vacuum: {gaol: hall}", False),
+        ("do: {task: mop, goal: hall}", False),
+        ("mop: hall", False),
+    ],
+)
+def test_init_writes_a_schema_that_knows_the_installed_tasks(elsewhere, house_tasks, step, fits):
+    init(elsewhere / "mine")
+    schema = json.loads((elsewhere / "mine" / "mission.schema.json").read_text())
+    text = f"name: mine\nsteps:\n  - {step}\n"
+    assert Draft202012Validator(schema).is_valid(parse_yaml(text, elsewhere).data) is fits

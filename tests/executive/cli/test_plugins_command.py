@@ -66,7 +66,8 @@ def test_unusable_entries_are_listed_with_their_reasons(ended):
 
 
 PAGES = """
-from tests.executive.house_tasks import Call, Vacuum
+from executive.words.task import Part
+from tests.executive.house_tasks import Call, Vacuum, Water
 
 class Mop(Vacuum):
     '''Mops a floor.'''
@@ -77,6 +78,16 @@ class Sing(Call):
     '''Calls out what is announced.'''
     word = "sing"
     sentences = ({"template": "(sing|announce) {text:object}", "samples": ["sing la la la"]},)
+
+class Dust(Water):
+    '''Dusts what no world has, and what the flat has.'''
+    word = "dust"
+    sentences = ({"template": "dust {thing:object}", "samples": ["dust the ficus", "dust the beer"]},)
+
+class Spin(Call):
+    '''Turns as often as is said, which is how often to do anything else, too.'''
+    word, object_is = "spin", Part.NUMBER
+    sentences = ({"template": "spin {number:object} [times]", "samples": ["spin 3 times"]},)
 
 class Take(Call):
     '''Takes all that is said.'''
@@ -89,7 +100,10 @@ TASKS = {
     "sing": "'announce to everybody that dinner is ready', a sentence of Errand itself, is also one of task 'sing' of",
     "take": "the template '{text:object}': it begins with no certain words",
     "vacuum": None,
+    "dust": None,
+    "spin": "its sample 'spin 3 times' is refused: I do not understand 'spin'",
 }
+SAMPLES = {"vacuum": "vacuum the hall", "dust": "dust the beer", "spin": None}
 
 
 def test_faults_of_tasks_are_listed_beside_tasks_without_any(tmp_path):
@@ -106,6 +120,8 @@ def test_faults_of_tasks_are_listed_beside_tasks_without_any(tmp_path):
         if (why is None) != (told[word] is None) or (why or "") not in str(told[word])
     ] == []
     assert ended.returncode == 1
+    shown = {each["name"]: each["sample"] for each in json_of(ended)["plugins"] if each["distribution"] == "house"}
+    assert {word: shown[word] for word in SAMPLES} == SAMPLES
 
 
 def test_a_command_imports_no_plug_in_that_it_does_not_use(site, monkeypatch, tmp_path):

@@ -120,7 +120,9 @@ def test_a_skill_adds_a_finding_by_publishing_an_answer(compiled, run_tree, scri
 
     script.ends["navigate"] = navigate
     worst = run_tree(compiled(CHECKS[2])).worst
-    assert ([one.answer for one in worst.findings], worst.message) == ([42], "the display shows 42")
+    (found,) = worst.findings
+    assert (found.answer, worst.message) == (42, "the display shows 42")
+    assert found.path_id.endswith("/navigate")
 
 
 def test_a_mission_that_also_brought_something_claims_both(compiled, run_tree, make):

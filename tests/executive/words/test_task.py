@@ -7,10 +7,10 @@ import pytest
 from executive.words import task as tasks
 from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
-from executive.words.steps import steps_from_yaml
+from executive.words.steps import steps_from_yaml, steps_to_yaml
 from executive.words.task import Part, basic, broken_tasks, installed_tasks, task_named
 from tests.executive.distribution import module_of_a_plug_in
-from tests.executive.house_tasks import Vacuum
+from tests.executive.house_tasks import Call, Vacuum
 
 PAGE = '''
 from executive.tree.task_page import TaskPage
@@ -52,6 +52,16 @@ class Pastless(Mop):
     """Has no past forms at all."""
     word = "hum"
     past = None
+
+class Undecided(Mop):
+    """Has a text for a truth."""
+    word = "skim"
+    needs_goal = "yes"
+
+class Spoken(Mop):
+    """Has a text for its samples."""
+    word = "chat"
+    spoken = "chat a bit"
 
 class Ruled(Mop):
     """Has a list for its rules."""
@@ -111,6 +121,8 @@ def test_a_task_of_another_distribution_stands_behind_the_shipped_ones(register)
         ("rinse = moppers:Unread", "its rows of unkept words have no expression 'said' with a 'reason'"),
         ("hum = moppers:Pastless", "its past is 'None'.*write {'swept': 'sweep'}"),
         ("rake = moppers:Ruled", "its rules is"),
+        ("skim = moppers:Undecided", "its needs_goal is 'yes'.*write True"),
+        ("chat = moppers:Spoken", "its spoken is 'chat a bit'"),
         ("mop = moppers:broken", "no subclass of executive.tree.task_page.TaskPage"),
         ("mop = moppers:nothing", "cannot load moppers:nothing.*repair or uninstall"),
         ("Mop = moppers:Mop", "calls itself 'mop'"),
@@ -122,6 +134,25 @@ def test_a_task_that_breaks_a_rule_is_named_with_its_distribution(register, line
     assert word not in installed_tasks()
     with pytest.raises(ValueError, match=f"task '{word}' of distribution moppers: .*{message}"):
         task_named(word)
+
+
+#   how a mission names a task
+FORMS = ["mop: hall", "{mop: hall, retries: 1}", "do: {task: mop, goal: hall}", "{do: mop, to: hall}"]
+
+
+@pytest.mark.parametrize("step", FORMS)
+@pytest.mark.parametrize("line", ["mop = moppers:broken", "mop = moppers:nothing", "mop = no_such_module:Mop"])
+def test_a_mission_with_a_task_that_cannot_be_used_names_the_distribution_and_the_cause(register, line, step):
+    register(line)
+    with pytest.raises(ValueError, match=r"task 'mop' of distribution moppers: .*(no subclass|cannot load)"):
+        steps_from_yaml([f"- {step}"])
+
+
+@pytest.mark.parametrize("step", FORMS)
+def test_a_mission_with_a_task_of_a_plug_in_that_is_not_installed_names_it(house_tasks, step):
+    house_tasks.pop("follow", None)
+    with pytest.raises(ValueError, match=r"'follow' needs the plug-in errand-people.*; pip install errand-people"):
+        steps_from_yaml([f"- {step.replace('mop', 'follow')}"])
 
 
 def test_two_distributions_with_one_word_are_both_named(register, tmp_path):
@@ -138,6 +169,13 @@ def test_a_shipped_task_keeps_its_word(register):
     assert type(task_named("grasp")).__module__.startswith("executive.")
 
 
+@pytest.fixture
+def more_kinds(house_tasks):
+    """The tasks of a house, one for a time and one for a number."""
+    for word, kind in {"rest": Part.TIME, "tune": Part.NUMBER}.items():
+        house_tasks[word] = type(word.title(), (Call,), {"word": word, "object_is": kind, "goal_is": Part.PLACE})()
+
+
 #   a step as it is written, the command that it is
 @pytest.mark.parametrize(
     ("step", "command"),
@@ -151,20 +189,59 @@ def test_a_shipped_task_keeps_its_word(register):
         ("call: dinner is ready", "Take [Nothing] to [Nothing] and do [call] to [dinner is ready]"),
         ("do: {task: grasp, object: beer, goal: desk}", "Take [Nothing] to [desk] and do [grasp] to [beer]"),
         ("{vacuum: kitchen, retries: 2}", "Take [Nothing] to [kitchen] and do [vacuum] to [Nothing]"),
+        ("{do: rest, object: 10}", "Take [Nothing] to [Nothing] and do [rest] to [10 second]"),
+        ("do: {task: rest, object: 2 min, goal: hall}", "Take [Nothing] to [hall] and do [rest] to [120 second]"),
+        ("rest: 1.5 min", "Take [Nothing] to [Nothing] and do [rest] to [90 second]"),
+        ("rest: 10 seconds", "Take [Nothing] to [Nothing] and do [rest] to [10 seconds]"),
+        ("{do: wait, object: 10 s}", "Take [Nothing] to [Nothing] and do [wait] to [10 second]"),
+        ("tune: 3", "Take [Nothing] to [Nothing] and do [tune] to [3]"),
+        ("tune: '-2.5'", "Take [Nothing] to [Nothing] and do [tune] to [-2.5]"),
+        ("do: {task: tune, object: 3}", "Take [Nothing] to [Nothing] and do [tune] to [3]"),
+        ("call: 3", "Take [Nothing] to [Nothing] and do [call] to [3]"),
+        ("call: 3 beers, please", 'Take [Nothing] to [Nothing] and do [call] to ["3 beers, please"]'),
+        (
+            "call: it is in front of the house",
+            'Take [Nothing] to [Nothing] and do [call] to ["it is in front of the house"]',
+        ),
     ],
 )
-def test_a_step_names_a_task_in_two_forms(house_tasks, step, command):
+def test_a_step_names_a_task_in_two_forms(more_kinds, step, command):
     (found,) = steps_from_yaml([f"- {step}"])
     assert isinstance(found, Do)
     assert str(found.command) == command
+    assert steps_from_yaml(steps_to_yaml([found])) == (found,)
+
+
+#   object of a task in a command, what it amounts to
+@pytest.mark.parametrize(
+    ("task", "said", "amount"),
+    [
+        ("rest", "90 second", 90.0),
+        ("rest", "hour", 3600.0),
+        ("rest", "beer", None),
+        ("tune", "3", 3.0),
+        ("tune", "three", 3.0),
+        ("tune", "2 beers", None),
+        ("water", "3 beers", None),
+        ("vacuum", "Nothing", None),
+    ],
+)
+def test_a_command_states_its_time_in_seconds_and_its_number(more_kinds, task, said, amount):
+    assert parse_command(f"Take [Nothing] to [Nothing] and do [{task}] to [{said}]").amount == amount
 
 
 @pytest.mark.parametrize(
     ("step", "message"),
     [
         ("vacuum: {gaol: hall}", "gaol"),
-        ("{vacuum: hall, water: beer}", "vacuum"),
-        ("{vacuum: hall, to: kitchen}", "vacuum"),
+        ("{vacuum: hall, water: beer}", "a step has either 'vacuum' or water, not both"),
+        ("{vacuum: hall, do: grasp}", "a step has either 'vacuum' or do, not both"),
+        ("{vacuum: hall, to: kitchen}", "'to' of 'vacuum' is said twice"),
+        ("tune: three", "should be a number; write 3"),
+        ("tune: true", "'tune' takes a number"),
+        ("nap: a while", 'should be a number, seconds, or as in "2 min"'),
+        ("nap: 0.5 s", "should be whole seconds"),
+        ("call: the [red] one", "cannot be in a command; leave brackets and double quotes out"),
         ("do: {goal: hall}", "grasp"),
         ("water:", "'do' and 'object' go together; 'water' needs its object, a thing"),
         ("call: {goal: hall}", "'call' needs its object, a text"),
@@ -176,6 +253,8 @@ def test_a_step_names_a_task_in_two_forms(house_tasks, step, command):
 )
 def test_a_faulty_form_is_refused(house_tasks, step, message):
     house_tasks["rest"] = type("Rest", (Vacuum,), {"word": "rest", "goal_is": Part.NOTHING})()
+    house_tasks["nap"] = type("Nap", (Call,), {"word": "nap", "object_is": Part.TIME})()
+    house_tasks["tune"] = type("Tune", (Call,), {"word": "tune", "object_is": Part.NUMBER})()
     with pytest.raises(ValueError, match=message):
         steps_from_yaml([f"- {step}"])
 

@@ -4,11 +4,14 @@ import subprocess
 import sys
 import threading
 import time
+import tomllib
 from importlib.metadata import EntryPoint
 
 import pytest
 
-from skills.inputs.plugins import PluginDefect, run_in_thread, run_plugin
+from skills.inputs.plugins import PluginDefect, missing_plugin, run_in_thread, run_plugin
+from skills.inputs.yaml_source import read_yaml
+from tests.sources import ROOT
 
 ENTRY = EntryPoint("wave", "wavers:Wave", "errand.skills")
 HANGS = """
@@ -78,3 +81,17 @@ def test_a_call_in_a_thread_that_hangs_is_abandoned():
     with pytest.raises(PluginDefect, match=r"not done within 0\.05 s"):
         run_in_thread(lambda: over.wait(10), limit_s=0.05)
     over.set()
+
+
+def test_a_name_of_a_plug_in_that_is_missing_is_told_with_how_to_install_it():
+    assert missing_plugin("errand.tasks", "follow") == (
+        "'follow' needs the plug-in errand-people, which is not installed",
+        "pip install errand-people",
+    )
+    assert missing_plugin("errand.tasks", "unheard") is None
+
+
+def test_the_table_of_plug_ins_has_what_they_register():
+    for name, groups in read_yaml(ROOT / "skills" / "inputs" / "plugins.yaml").data.items():
+        project = tomllib.loads((ROOT / "plugins" / name / "pyproject.toml").read_text())["project"]
+        assert {group: sorted(project["entry-points"][group]) for group in groups} == groups

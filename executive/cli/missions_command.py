@@ -35,8 +35,7 @@ def init(
             shutil.copyfile(file, folder / file.name)
         schema = json.loads((FOLDER / _SCHEMA).read_text(encoding="utf-8"))
         add_tasks(schema["$defs"]["Do"])
-        text = json.dumps(schema, indent=2, ensure_ascii=False)
-        (folder / _SCHEMA).write_text(f"{text}\n", encoding="utf-8")
+        (folder / _SCHEMA).write_text(f"{json.dumps(schema, indent=2, ensure_ascii=False)}\n", encoding="utf-8")
     first = folder / next(iter(shipped_missions().values())).name
     console_for(as_json=False).print(f"{len(new)} files in {folder}; try: errand run {first}", markup=False)
 

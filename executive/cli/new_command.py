@@ -124,22 +124,21 @@ def render_task(name: str, folder: Path) -> tuple[Path, ...]:
     from executive.words.task import installed_tasks
 
     renamed = {"page.py": f"{_TASK.package(name)}.py", "test_task.py": f"test_{name}.py"}
-    taken = frozenset({*installed_tasks(), *STEP_KEYS})
-    if name not in taken and (why := _unsayable(name.replace("_", " "))):
+    taken = frozenset(installed_tasks())
+    step = "missions have a step of this name" if name in STEP_KEYS else None
+    if name not in taken and (why := step or _unsayable(name.replace("_", " "))):
         raise InputError(f"'{name}' cannot be the name of a task: {why}", hint="choose a verb, as in 'sweep_up'")
     return _render(_TASK, name, folder, taken, renamed)
 
 
 def _unsayable(spoken: str) -> str | None:
     """Returns why the words of a new task cannot be said; None if they can."""
-    from executive.app.prepare.worlds import knowledge_of, open_world
+    from executive import parse
     from executive.language.clauses import cut, trailing_cue
-    from executive.language.parser import load_parser
-    from executive.language.understand import understand
 
-    said, parser, flat = f"{spoken} the kitchen", load_parser(), knowledge_of(open_world("flat"))
+    said = f"{spoken} the kitchen"
     for sentence in (said, spoken, f"{spoken} every room", f"{spoken} the beer"):
-        if understand(sentence, parser=parser, knowledge=flat, require_wake=False).all_steps:
+        if parse(sentence).all_steps:
             return f"'{sentence}' is a sentence of Errand already"
     whole = [clause.text for clause in cut(said)] == [said] and trailing_cue(said) is None
     return None if whole else f"'{said}' is no plain request"

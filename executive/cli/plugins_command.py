@@ -15,15 +15,13 @@ from typing import Annotated, Final
 
 import typer
 
-from executive.app.prepare.worlds import knowledge_of, open_world
+import executive
 from executive.cli.entry import COMMANDS, COMMANDS_GROUP, as_command, shipped_command
 from executive.cli.number_options import quantity_option
 from executive.cli.options import AS_JSON, takes_request
 from executive.cli.output import console_for, finish, progress_bar, show_table
-from executive.language.parser import load_parser
 from executive.language.questions import RefusalKind
 from executive.language.task_sentences import other_readings, sentence_faults
-from executive.language.understand import understand
 from executive.mission.load import load_stack
 from executive.mission.request import Request
 from executive.store import trigger_source
@@ -200,17 +198,15 @@ def _with_sample(plugin: Plugin) -> Plugin:
     The task is broken if all its samples are refused.
     """
     task, best = installed_tasks()[plugin.name], plugin
-    parser, flat = load_parser(), knowledge_of(open_world("flat"))
     for sample in task.samples:
-        meant = understand(sample, parser=parser, knowledge=flat, require_wake=False)
+        meant = executive.parse(sample)
         tasks = {command.task for one in meant.all_steps for step in one.walk() for command in step.commands}
         if task in tasks or (tasks and not task.sentences):
             return replace(plugin, sample=sample)
-        if meant.refused_as is RefusalKind.OTHER and meant.unknown_words:
-            best = best if best.sample else replace(plugin, sample=sample)
-        elif best == plugin:
-            why = f"is refused: {meant.reason}" if meant.reason else "has another meaning"
-            best = replace(plugin, broken=f"its sample '{sample}' {why}; give it other words")
+        elsewhere = meant.refused_as is RefusalKind.OTHER and meant.unknown_words
+        why = f"its sample '{sample}' is refused: {meant.reason or 'it has another meaning'}; give it other words"
+        found = replace(plugin, sample=sample) if elsewhere else replace(plugin, broken=why)
+        best = best if best.sample or (best.broken and not elsewhere) else found
     return best
 
 

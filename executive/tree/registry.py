@@ -17,16 +17,9 @@ from typing import Any, Final
 
 from executive.tree.port_values import describe_type, field_types
 from skills.api import Cause, Skill
+from skills.inputs import plugins
 from skills.inputs.errors import InputError, suggestion
-from skills.inputs.plugins import (
-    LIMIT_S,
-    OURS,
-    PluginDefect,
-    distribution_of,
-    installed_plugins,
-    missing_plugin,
-    run_plugin,
-)
+from skills.inputs.plugins import LIMIT_S, OURS, PluginDefect, distribution_of, installed_plugins, run_plugin
 
 GROUP: Final = "errand.skills"
 
@@ -92,7 +85,7 @@ def missing_skill(name: str, registry: Mapping[str, SkillClass]) -> tuple[str, s
     if broken is not None:
         return broken.message, broken.hint
     known = registry.names if isinstance(registry, SkillRegistry) else registry
-    return missing_plugin(GROUP, name) or (f"there is no skill '{name}'", suggestion(name, known))
+    return plugins.missing_plugin(GROUP, name) or (f"there is no skill '{name}'", suggestion(name, known))
 
 
 def installed_skills() -> SkillRegistry:

@@ -396,7 +396,7 @@ def add_tasks(do: dict[str, Any]) -> None:
     whole = {**form, "properties": {"task": word, **parts}, "required": ["task"]}
     keys["do"] = {**keys["do"], "anyOf": [word, whole, {"type": "null"}]}
     for task in short:
-        keys[task.word] = {"anyOf": [own[_main_part(task)[0]], form], "description": task.about}
+        keys[task.word] = {"anyOf": [own[_main_part(task)[0]], form], "description": type(task).__doc__}
     do["anyOf"] = [{"required": [key]} for key in (*COMMAND_KEYS, *(task.word for task in short))]
 
 
@@ -423,10 +423,7 @@ def steps_to_data(steps: Iterable[Step]) -> list[Any]:
 def steps_to_yaml(steps: Iterable[Step]) -> tuple[str, ...]:
     """Converts steps to the lines of a mission file's `steps`; no lines for no steps."""
     data = steps_to_data(steps)
-    if not data:
-        return ()
-    text = yaml_of(data, width=1_000_000)
-    return tuple(text.splitlines())
+    return tuple(yaml_of(data, width=1_000_000).splitlines()) if data else ()
 
 
 def lines_of_steps(steps: Sequence[Step]) -> tuple[str, ...]:

@@ -17,16 +17,9 @@ from typing import Any, ClassVar, Final
 from pydantic_core import PydanticKnownError, core_schema
 
 from executive.words.goal import GoalCondition
+from skills.inputs import plugins
 from skills.inputs.errors import InputError, listing
-from skills.inputs.plugins import (
-    OURS,
-    TASKS,
-    PluginDefect,
-    distribution_of,
-    installed_plugins,
-    missing_plugin,
-    run_plugin,
-)
+from skills.inputs.plugins import OURS, TASKS, PluginDefect, distribution_of, installed_plugins, run_plugin
 from skills.quantities import QuantityError
 
 NOTHING: Final = "Nothing"
@@ -89,11 +82,6 @@ class Task:
         return tuple(sample for row in self.sentences for sample in row["samples"]) or self.spoken
 
     @property
-    def about(self) -> str:
-        """First line of its docstring."""
-        return (type(self).__doc__ or "").strip().partition("\n")[0]
-
-    @property
     def named(self) -> str:
         """Name with the distribution that registers the task."""
         return f"task '{self.word}' of {self.owner or 'an unknown distribution'}"
@@ -152,7 +140,7 @@ def is_task(word: object) -> bool:
 def _missing(word: object) -> tuple[str, str] | None:
     """Message and hint for the word of a task that cannot be used, or whose plug-in is not installed."""
     broken = broken_tasks().get(str(word))
-    return missing_plugin(TASKS, str(word)) if broken is None else (broken.message, broken.hint)
+    return plugins.missing_plugin(TASKS, str(word)) if broken is None else (broken.message, broken.hint)
 
 
 def installed_tasks() -> Mapping[str, Task]:
@@ -209,8 +197,6 @@ def _faults(kind: Any, word: str) -> Iterator[tuple[str, str]]:
         yield f"{word!r} is no word in lower case", "name it by a verb, as in 'vacuum'"
     if not (kind.__dict__.get("__doc__") or "").strip():
         yield "it has no docstring", "say in one sentence what it does"
-    if not all(isinstance(part, Part) for part in (kind.object_is, kind.goal_is, kind.item_is)):
-        yield "object_is, goal_is and item_is are kinds of parts", "write Part.PLACE, for instance"
     if not (isinstance(kind.sentences, tuple) and all(map(_is_row, kind.sentences))):
         row = "({'template': 'vacuum {place:goal}', 'samples': ['vacuum the hall']},)"
         yield "its sentences are no rows of a template with samples", f"write {row}"
@@ -233,6 +219,7 @@ _FACTS: Final[Mapping[str, tuple[Any, str]]] = {
     "ability": (str, "'sweep floors'"),
     "number": (int, "255"),
     "spoken": (tuple, "('sweep the hall',)"),
+    **dict.fromkeys(("object_is", "goal_is", "item_is"), (Part, "Part.PLACE")),
     **dict.fromkeys(("needs_goal", "several", "answers"), (bool, "True")),
 }
 """Facts of a page by name: their types, and an example."""

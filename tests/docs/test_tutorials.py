@@ -1,4 +1,4 @@
-"""The tutorials and three how-to pages do what they say: files are written, commands run, the shown output comes."""
+"""The tutorials and four how-to pages do what they say: files are written, commands run, the shown output comes."""
 
 import contextlib
 import os
@@ -16,7 +16,7 @@ from executive.cli.entry import app
 from tests.docs.documents import DOCS, Block, blocks
 
 TUTORIALS = sorted((DOCS / "tutorials").glob("[0-9]*.md"))
-HOW_TO = [DOCS / "how-to" / name for name in ("own-world.md", "own-object.md", "own-robot.md")]
+HOW_TO = [DOCS / "how-to" / name for name in ("own-world.md", "own-object.md", "own-robot.md", "own-task.md")]
 PAGES = [*TUTORIALS, *HOW_TO]
 
 

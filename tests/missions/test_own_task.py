@@ -38,3 +38,4 @@ def test_the_robot_reads_a_number_from_a_display_and_says_it(tmp_path):
     result, verdict = mission.run()
     assert (result.outcome.value, verdict.success) == ("success", True), (result, verdict)
     assert [each.text for each in result.said] == ["the meter shows 407"]
+    assert [each.answer for each in result.findings] == ["407"]

@@ -116,7 +116,7 @@ def test_a_task_of_another_distribution_stands_behind_the_shipped_ones(register)
         ("hush = moppers:Silent", "has no docstring"),
         ("idle = moppers:Planless", "does not define plan"),
         ("dream = moppers:Listless", "its sentences are no rows of a template with samples"),
-        ("drift = moppers:Kindless", "object_is, goal_is and item_is are kinds of parts"),
+        ("drift = moppers:Kindless", "its goal_is is 'place'; write Part.PLACE"),
         ("wipe = moppers:Texted", "its verbs are no single words"),
         ("rinse = moppers:Unread", "its rows of unkept words have no expression 'said' with a 'reason'"),
         ("hum = moppers:Pastless", "its past is 'None'.*write {'swept': 'sweep'}"),

@@ -160,7 +160,9 @@ class ReadDisplay(LookingSkill[ReadDisplayInputs]):
         if found[0] is None or found[0] != found[1]:
             seen = " and ".join("no certain number" if each is None else each for each in found)
             raise SkillFailure(Cause.POSTCONDITION, f"two views of {inputs.of} show {seen}")
-        return Succeeded(f"{inputs.of} shows {found[0]}", {"text": f"{inputs.of} shows {found[0]}"})
+        shows = f"{inputs.of} shows {found[0]}"
+        self.context.publish("answer", {"question": f"{inputs.of}'s number", "answer": found[0], "message": shows})
+        return Succeeded(shows, {"text": shows})
 
     def _viewpoints(self, p_BT: FloatArray, turns: tuple[tuple[float, float], ...]) -> Iterator[FloatArray]:
         """Yields positions of the camera before the display, on the side of the shoulder."""

@@ -329,9 +329,8 @@ def _turned(
     if count[0] * count[1] > 4 * MOST_CELLS:
         raise source.error(("origin",), "origin: the map becomes too large when it is turned", "cut it")
     across, up = np.meshgrid(*(edge + (np.arange(n) + 0.5) * step for edge, n in zip(low, count, strict=True)))
-    column, row = (
-        np.floor(along / file.resolution).astype(int) for along in (c * across + s * up, c * up - s * across)
-    )
+    turned = (c * across + s * up, c * up - s * across)
+    column, row = (np.floor(along / file.resolution).astype(int) for along in turned)
     inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
     column, row = column.clip(0, columns - 1), row.clip(0, rows - 1)
     origin_m = (x + float(low[0]), y + float(low[1]))

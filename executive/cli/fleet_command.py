@@ -19,9 +19,7 @@ from executive.store.missions import STORE, GivenMissions, MissionState, Mission
 from skills.inputs.errors import InputError
 from skills.inputs.outside import is_folder, is_there
 
-fleet = typer.Typer(
-    name="fleet", help="Run the queued missions with several robots.", no_args_is_help=True, rich_markup_mode=None
-)
+fleet = typer.Typer(name="fleet", help="Run a queue with several robots.", no_args_is_help=True, rich_markup_mode=None)
 
 Queue = Annotated[Path, typer.Argument(metavar="QUEUE", help="The store of `errand queue add`, or its folder.")]
 

@@ -40,17 +40,11 @@ def grouped(group: Group, *names: str, **settings: Any) -> Any:
     return typer.Option(*names, rich_help_panel=group.value, **settings)
 
 
-START = Annotated[
-    str | None, typer.Option(_START, metavar="X Y YAW", help="Start of the robot, in metres and radians.")
-]
+START = Annotated[str | None, typer.Option(_START, metavar="X Y YAW", help="Start of the robot, metres and radians.")]
 """Type of a parameter for the option `--start` of a `StartCommand`; `start_pose` parses it."""
-STORE = Annotated[
-    Path | None, grouped(Group.OUTPUT, help="File of the missions; by default a hidden one in the folder for logs.")
-]
+STORE = Annotated[Path | None, grouped(Group.OUTPUT, help="File of the missions; by default a hidden one beside logs.")]
 ANYWAY = Annotated[bool, grouped(Group.REQUEST, "--anyway", help="Begin in spite of errors of `errand check`.")]
-AS_JSON = Annotated[
-    bool, grouped(Group.OUTPUT, "--json", help="The last line of standard output is the result as JSON.")
-]
+AS_JSON = Annotated[bool, grouped(Group.OUTPUT, "--json", help="The last line of the output is the result as JSON.")]
 """Type of a parameter for the option `--json`, by default False."""
 QUIET = Annotated[bool, grouped(Group.OUTPUT, "--quiet", help="Show no lines and no tree during the run.")]
 VIEW = Annotated[
@@ -65,9 +59,7 @@ VIEW = Annotated[
 ]
 PORT = Annotated[int, quantity_option(Port, help="Port of the page; 0 takes a free one.", group=Group.PAGE)]
 """Type of a parameter `view_port` for the option `--view-port`, by default 0."""
-HOST = Annotated[
-    str, grouped(Group.PAGE, metavar="HOST", help="Address of the page; 0.0.0.0 lets other machines in by the link.")
-]
+HOST = Annotated[str, grouped(Group.PAGE, metavar="HOST", help="Address of the page; 0.0.0.0 lets other machines in.")]
 """Type of a parameter `view_host` for the option `--view-host`, by default 127.0.0.1."""
 
 ROBOT = Annotated[

@@ -210,9 +210,7 @@ def _with_sample(plugin: Plugin) -> Plugin:
     return best
 
 
-stack = typer.Typer(
-    name="stack", help="What a robot uses: localiser, planners, controller, detector.", rich_markup_mode=None
-)
+stack = typer.Typer(name="stack", help="The robot's localiser, planners, controller, detector.", rich_markup_mode=None)
 
 
 @stack.callback()

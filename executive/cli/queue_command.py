@@ -33,23 +33,14 @@ if TYPE_CHECKING:
 
     from executive.app.runs.queue import MissionResult, MissionRuns
 
-queue = typer.Typer(
-    name="queue", help="Store missions, and run them one after another.", no_args_is_help=True, rich_markup_mode=None
-)
+queue = typer.Typer(name="queue", help="Store missions, run them in turn.", no_args_is_help=True, rich_markup_mode=None)
 
 Out = Annotated[Path, typer.Option(help="Folder for logs, with a folder for each mission.")]
 RunsOut = Annotated[Path | None, typer.Option("--out", help="Replaces the --out of the missions; 'out' for the store.")]
 NoRecord = Annotated[bool, typer.Option("--no-record", help="Leave no recording and no pictures.")]
-Number = Annotated[
-    int, quantity_argument(Count, metavar="NUMBER", help="Number of the mission in `errand queue list`.")
-]
-At = Annotated[
-    str | None,
-    typer.Option(metavar="TIME", help='Queue it at these times, as in "every weekday 09:00" or "2026-12-01 09:00".'),
-]
-EveryPeriod = Annotated[
-    str | None, typer.Option("--every", metavar="PERIOD", help="Queue it in this period, as in 30m, 2h or 90s.")
-]
+Number = Annotated[int, quantity_argument(Count, metavar="NUMBER", help="Number of a mission in `errand queue list`.")]
+At = Annotated[str | None, typer.Option(metavar="TIME", help='As in "every weekday 09:00" or "2026-12-01 09:00".')]
+EveryPeriod = Annotated[str | None, typer.Option("--every", metavar="PERIOD", help="Its period, as in 30m, 2h or 90s.")]
 On = Annotated[
     str | None,
     typer.Option(metavar="EVENT", help='Queue it on "battery full", "battery 80%", "call NAME" or "topic KIND:TOPIC".'),

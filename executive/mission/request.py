@@ -138,9 +138,7 @@ class Request:
     sentence: Annotated[
         str | None, Option('What is said, as in "Hey Alice, fetch me a drink".', "--say", group=Heading.REQUEST)
     ] = None
-    file: Annotated[
-        Path | None, Option("A file, or a name of `errand missions`.", metavar="MISSION", argument=True)
-    ] = None
+    file: Annotated[Path | None, Option("File, or name in `errand missions`.", metavar="MISSION", argument=True)] = None
     world: Annotated[str | None, Option("World by name or folder; flat unless said.", group=Heading.WORLD)] = None
     require_wake: Annotated[
         bool | None,

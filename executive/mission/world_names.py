@@ -46,10 +46,8 @@ def _wrong_relations(command: Command, knowledge: Knowledge) -> Iterator[tuple[s
         yield "to", f"'{command.goal}' is no surface, and the spot is {command.goal_relations[0]}", hint
     landmarks = (*knowledge.object_names(), *knowledge.place_names(), *knowledge.people, ROBOT, DOOR)
     related = {key: () if item is None else item.relations for key, item in objects.items()}
-    own = {
-        RelationKind.SEEN_FROM: ("person", tuple(knowledge.people)),
-        RelationKind.NOT_AT: ("place", knowledge.place_names()),
-    }
+    places, people = ("place", knowledge.place_names()), ("person", tuple(knowledge.people))
+    own = {RelationKind.SEEN_FROM: people, RelationKind.NOT_AT: places}
     for key, relations in {**related, "to": command.goal_relations}.items():
         for relation in relations:
             what, known = own.get(relation.kind, ("landmark", landmarks))
@@ -69,8 +67,7 @@ def _wrong_with_task(command: Command, knowledge: Knowledge) -> Iterator[tuple[s
     if whom is not None and task.object_is in (Part.TIME, Part.NUMBER) and command.amount is None:
         yield "object", f"'{whom}' is no {task.object_is.value}", 'write it in digits, as in "3" or "10 second"'
     if whom is not None and task.object_is is Part.PLACE and knowledge.place(str(whom)) is None:
-        known = knowledge.place_names()
-        yield "object", f"unknown place '{whom}'", suggestion(str(whom), knowledge.spellings(known), shown=known)
+        yield "object", f"unknown place '{whom}'", suggestion(str(whom), knowledge.place_names())
     if command.item is not None and task.item_is is Part.NOTHING:
         hint = "take it there in a step of its own"
         yield "take", f"the {command.item} cannot be taken along by '{task.word}'", hint

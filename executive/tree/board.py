@@ -148,9 +148,8 @@ class LastKnownTracker:
     """Tracks on a mission's blackboard which object was seen, released or dropped last, and where (`last`)."""
 
     def __init__(self, root: NodeSpec) -> None:
-        self._keys: Mapping[str, Sign] = {
-            key: sign for node in root.walk() for key, sign in node.behaviour.signs(node.options).items()
-        }
+        signs = (node.behaviour.signs(node.options) for node in root.walk())
+        self._keys: Mapping[str, Sign] = {key: sign for each in signs for key, sign in each.items()}
         self._values: Mapping[str, Any] | None = None
         self._kind: ObjectKind | None = None
         self.last: LastKnown | None = None

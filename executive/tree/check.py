@@ -271,9 +271,8 @@ def _nobody_takes(command: Command, knowledge: Knowledge, abilities: Abilities) 
         hint = "name a surface to put it on, or add somebody under 'people'"
         yield f"nobody is in this world who could take the {command.item}", hint
     elif person is not None and person not in abilities.takers:
-        others = (
-            f"name {listing(sorted(abilities.takers), last='or')}" if abilities.takers else "add them under 'people'"
-        )
+        takers = listing(sorted(abilities.takers), last="or")
+        others = f"name {takers}" if abilities.takers else "add them under 'people'"
         message = f"{person} is not in this world, or takes nothing, so nobody takes the {command.item}"
         yield message, f"{others}, or name a surface to put it on"
 

@@ -59,9 +59,7 @@ def surfaces_to_search(knowledge: Knowledge, item: ObjectKind, place: str | None
     The surfaces of a room that is a usual place count as usual. None is at a place where the object is said not to be.
     """
     left_out = surfaces_left_out(knowledge, item)
-    inside = [
-        name for name in (knowledge.tops if place is None else knowledge.surfaces_in(place)) if name not in left_out
-    ]
+    inside = [n for n in (knowledge.tops if place is None else knowledge.surfaces_in(place)) if n not in left_out]
     usual = (name for spot in knowledge.usual_surfaces(item.name) for name in knowledge.surfaces_in(spot))
     return tuple(dict.fromkeys((*(name for name in usual if name in inside), *inside)))
 

@@ -93,8 +93,8 @@ def plan_faults(plan: NodeSpec) -> Iterator[str]:
         needed = {name for name, each in known.items() if each.default is MISSING is each.default_factory} - given
         if needed & {"child", "children"} and not node.children:
             yield f"{named} has no steps"
-        lacks = needed - {"child", "children"} - node.options.keys()
-        yield from (f"{named} lacks the option '{each}'" for each in sorted(lacks))
+        lacks = sorted(needed - {"child", "children"} - node.options.keys())
+        yield from (f"{named} lacks the option '{each}'" for each in lacks)
         yield from (f"{named} has no option '{each}'" for each in node.options if each not in known)
         if node.path_id in seen:
             yield f"two nodes have the path id '{node.path_id}'; build one below another, by builder.at"

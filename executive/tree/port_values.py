@@ -163,9 +163,7 @@ def _named(key: str, names: Iterable[str]) -> str | None:
 def _port_of(loose: Mapping[str, Any], hints: Mapping[str, Any], taken: Iterable[str]) -> str:
     """Returns the only port whose type has all these fields. Raises PortValueError if there is not exactly one."""
     records = {port: field_types(hint) for port, hint in hints.items() if _is_record(hint)}
-    fitting = [
-        port for port, fields in records.items() if port not in taken and all(_named(key, fields) for key in loose)
-    ]
+    fitting = [p for p, fields in records.items() if p not in taken and all(_named(key, fields) for key in loose)]
     if len(fitting) == 1:
         return fitting[0]
     fields = {unitless_name(name) for names in (*records.values(), hints) for name in names}
@@ -293,9 +291,8 @@ def _name(value: Any, wanted: str, path: Path) -> str:
 
 
 def _refusal(value: Any, wanted: str, path: Path) -> PortValueError:
-    return PortValueError(
-        path, f"{str(value)[:60]!r} does not fit" if value is not None else "it is empty", f"give {wanted}"
-    )
+    fault = "it is empty" if value is None else f"{str(value)[:60]!r} does not fit"
+    return PortValueError(path, fault, f"give {wanted}")
 
 
 def _unknown(kind: str, name: str, known: tuple[str, ...], knowledge: Knowledge, path: Path) -> PortValueError:

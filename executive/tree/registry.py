@@ -129,9 +129,7 @@ def _checked(entry: EntryPoint, limit_s: float) -> SkillClass:
         skill = run_plugin(entry, entry.load, limit_s=limit_s)
         faults = run_plugin(entry, lambda: list(faults_of(skill, registered_as=entry.name)))
     except PluginDefect as defect:
-        raise _error(
-            entry, f"cannot load {entry.value} ({defect})", "repair or uninstall that distribution"
-        ) from defect
+        raise _error(entry, f"cannot load {entry.value} ({defect})", "repair or uninstall it") from defect
     for message, hint in faults:
         raise _error(entry, message, hint)
     return skill  # type: ignore[no-any-return]

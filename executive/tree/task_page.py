@@ -58,4 +58,4 @@ def from_page(task: Task, method: str, call: Callable[[TaskPage], ResultT], *kin
 def defective(task: Task, method: str, fault: str) -> InputError:
     """Builds the error for a `method` of a task's page that has a defect."""
     what = f"the method '{method}' of {task.named} has a defect: {fault}"
-    return InputError(what[:300], hint=f"repair its page {type(task).__module__}")
+    return InputError(what[:300], hint=f"repair its page, {type(task).__module__}")

@@ -61,9 +61,7 @@ class RobotFacts(Strict):
 class BatteryFacts(Strict):
     """States of charge (0 to 1) at which the robot goes to the dock and leaves it."""
 
-    low: Annotated[float, Quantity(ge=0.0, lt=1.0)] = Field(
-        default=0.15, description="below this the mission is interrupted"
-    )
+    low: Annotated[float, Quantity(ge=0.0, lt=1.0)] = Field(default=0.15, description="interrupts a mission below it")
     charged: Annotated[float, Quantity(gt=0.0, le=1.0)] = Field(default=0.8, description="at this the mission goes on")
 
     @model_validator(mode="after")
@@ -77,9 +75,7 @@ class Place(Strict):
     """Room, with its outline (world frame, m), or a named pose without one: other names, the pose of a robot there."""
 
     pose: Pose = Field(description="pose of a robot in it; that of a named pose is taken exactly")
-    polygon: Polygon | None = Field(
-        default=None, description="outline of a room, corners (x, y); a place without one is a named pose"
-    )
+    polygon: Polygon | None = Field(default=None, description="corners (x, y) of a room's outline; none: a named pose")
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
     shows: tuple[Coordinate, Coordinate, Height] | None = Field(
         default=None, description="the point (x, y, z) that a picture from a named pose shows; by default what is ahead"
@@ -105,10 +101,7 @@ class SurfaceFacts(Strict):
     polygon: Polygon = Field(description="outline of the top, corners (x, y)")
     viewpoints: Annotated[tuple[Pose, ...], Field(min_length=1, description="poses from which it is seen whole")]
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
-    bin: bool = Field(
-        default=False,
-        description="whether it is a bin, open at the top with its rim at `height`, for what is thrown away",
-    )
+    bin: bool = Field(default=False, description="whether it is a bin for what is thrown away, its rim at `height`")
 
     def surface(self, name: str) -> Surface:
         """Surface as the skills' own data type; left and right are as seen from the first viewpoint."""
@@ -154,17 +147,13 @@ class Knowledge(Strict):
     """All knowledge of one world. Names match without regard to case."""
 
     robot: RobotFacts = Field(default=RobotFacts(name="Alice"), description="the robot")
-    robots: RobotsFile | None = Field(
-        default=None, description="the robots of runs in this world that name none themselves, by name"
-    )
+    robots: RobotsFile | None = Field(default=None, description="the robots of runs that name none themselves, by name")
     start: Pose = Field(description="its pose at the beginning")
     dock: Pose | None = Field(default=None, description="its pose for charging; without one it cannot charge")
     battery: BatteryFacts = Field(default=BatteryFacts(), description="charge at which it goes to the dock and leaves")
     places: dict[Name, Place] = Field(default_factory=dict, description="the rooms and the named poses by name")
     doors: tuple[Door, ...] = Field(default=(), description="the narrow passages between rooms")
-    surfaces: dict[Name, SurfaceFacts] = Field(
-        default_factory=dict, description="the flat tops where objects lie, by name"
-    )
+    surfaces: dict[Name, SurfaceFacts] = Field(default_factory=dict, description="flat tops where objects lie, by name")
     things: dict[Name, ObjectFacts] = Field(default_factory=dict, description="the classes of objects by name")
     people: dict[Name, Person] = Field(default_factory=dict, description="the people by name")
     tags: tuple[TagFacts, ...] = Field(default=(), description="the AprilTags that the robot may use")

@@ -27,12 +27,8 @@ from skills.inputs.schema import Name, Strict, Text
 from skills.quantities import Duration, Number, QuantityError, Share, clock_text
 
 COMMAND_KEYS: Final = ("take", "to", "do", "object")
-_ELSEWHERE: Final = (
-    "Whether the robot also searches elsewhere for an object that is not there; by default, if it is its usual place."
-)
-_GIVES: Final = (
-    "Names for the skill's output ports, or for the answer; later steps read them with {from: NAME} and in expressions."
-)
+_ELSEWHERE: Final = "Whether the robot also searches elsewhere; by default, if the place is the object's usual one."
+_GIVES: Final = "Names for the output ports or the answer; later steps read them with {from: NAME} and in expressions."
 
 
 class Say(Step):
@@ -65,9 +61,7 @@ class Do(Step):
     """Step with one command, written as its parts."""
 
     take: ObjectWords | None = Field(default=None, description="The object to carry; a number may stand before it.")
-    to: Goal | None = Field(
-        default=None, description='The place or person, or "start", or "Robin at hall"; or a spot on a surface.'
-    )
+    to: Goal | None = Field(default=None, description='Place, person, "start", "Robin at hall", or spot on a surface.')
     do: Task | None = Field(default=None, description="The task there, on the object.")
     object: Annotated[
         ObjectWords | None, BeforeValidator(_of_kind, json_schema_input_type=ObjectWords | Number | None)
@@ -121,10 +115,7 @@ def steps_of_commands(commands: Sequence[Command]) -> tuple[Do, ...]:
     return tuple(map(Do.from_command, commands))
 
 
-_With = Annotated[
-    dict[str, Any] | None,
-    Field(alias="with", description="The skill's input ports, or the parameters of the used file."),
-]
+_With = Annotated[dict[str, Any] | None, Field(alias="with", description="The skill's ports, or a file's parameters.")]
 
 
 class CallSkill(Step):
@@ -179,9 +170,7 @@ class Awaited(Strict):
     condition: Annotated[Condition | None, Field(alias="for", description="Wait until this holds.")] = None
     seconds: Duration | None = Field(default=None, description='Length of the wait: seconds, or "10 min".')
     until_clock: Clock | None = Field(default=None, description='Until this time of day, as in "14:30".')
-    every_s: Annotated[Duration, Field(alias="every", description="How often the robot looks for the condition.")] = (
-        15.0
-    )
+    every_s: Annotated[Duration, Field(alias="every", description="How often the robot looks for it.")] = 15.0
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
@@ -194,9 +183,7 @@ class Wait(Step):
     """`wait`: waits for a condition, for a duration, or until a time of day."""
 
     key: ClassVar[str] = "wait"
-    awaited: Annotated[
-        Awaited, Field(alias="wait", description="Wait for a condition, some time, or until a time of day.")
-    ]
+    awaited: Annotated[Awaited, Field(alias="wait", description="Wait for a condition, a duration or a time of day.")]
 
     @property
     def words(self) -> str:
@@ -226,9 +213,7 @@ class Check(Answering):
     """`check`: answers whether a condition holds; the answer is part of the mission's result."""
 
     key: ClassVar[str] = "check"
-    condition: Annotated[
-        Condition, Field(alias="check", description="Answer whether a condition holds, as part of the result.")
-    ]
+    condition: Annotated[Condition, Field(alias="check", description="Answers, in the result, whether this holds.")]
 
     @property
     def words(self) -> str:
@@ -239,9 +224,7 @@ class Check(Answering):
 class Charging(Strict):
     """Level of charge at the dock."""
 
-    level: Share | None = Field(
-        default=None, description="The charge, from 0 to 1; by default as the knowledge file says."
-    )
+    level: Share | None = Field(default=None, description="The charge, from 0 to 1; by default the knowledge file's.")
 
 
 class Dock(Step):

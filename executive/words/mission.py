@@ -58,13 +58,9 @@ class Manner(Strict):
     """Manner in which a person walks."""
 
     speed: Speed = Field(default=1.2, description="Speed of the person, in m/s.")
-    loop: StrictBool = Field(
-        default=False, description="Whether the first waypoint follows the last; by default, once."
-    )
+    loop: StrictBool = Field(default=False, description="Whether the first waypoint follows the last; by default not.")
     yields: StrictBool = Field(default=True, description="Whether the person stops for a robot that is close ahead.")
-    apart: StrictBool = Field(
-        default=False, description="Whether the person keeps apart from other people; who follows or wanders does."
-    )
+    apart: StrictBool = Field(default=False, description="Keeps apart from people, as followers and wanderers do.")
     pace: Annotated[Share, Field(lt=1.0)] = Field(
         default=0.0, description="Share by which the seed changes the speed every 3 m, up and down."
     )
@@ -83,9 +79,7 @@ class Manner(Strict):
         default=1.0,
         description="Probability that the person, asked by a robot to let it pass, does so; 0 for the deaf.",
     )
-    says: Text | None = Field(
-        default=None, description="Words to the nearest robot within 3 m, once, at the end of the route."
-    )
+    says: Text | None = Field(default=None, description="Words to a robot within 3 m, once, at the end of the route.")
 
 
 class Route(Manner):
@@ -160,14 +154,9 @@ class MissionPart(_Whole):
         default=None, description="The robot, or the robots, whose parts must be done before this one begins."
     )
     steps: Annotated[Steps, Field(description="Its steps, in order.")]
-    always: Annotated[
-        Branch,
-        Field(description="Steps at the end of the part in any case, also when the mission is cancelled."),
-    ] = ()
+    always: Annotated[Branch, Field(description="Steps at the part's end in any case, also when cancelled.")] = ()
     while_: Annotated[While | None, Field(alias="while", description="Condition that must hold meanwhile.")] = None
-    when: tuple[Handler, ...] | None = Field(
-        default=None, description="Conditions that interrupt the part, the most important first."
-    )
+    when: tuple[Handler, ...] | None = Field(default=None, description="Conditions that interrupt it, by importance.")
 
     @property
     def first(self) -> tuple[str, ...]:
@@ -208,9 +197,7 @@ class Mission(_Whole):
     imports: tuple[Name, ...] | None = Field(
         default=None, description="Folders of `errand object import`, as seen from this file's folder."
     )
-    objects: dict[Name, LooseObject] | None = Field(
-        default=None, description="Further objects in the world at the beginning, by name."
-    )
+    objects: dict[Name, LooseObject] | None = Field(default=None, description="Further objects in the world, by name.")
     parameters: _Parameters | None = Field(
         default=None,
         description="Parameters with their defaults, or {type: .., default: ..}, read as ${name} in values; one "
@@ -230,13 +217,9 @@ class Mission(_Whole):
     parts: Annotated[dict[Name, MissionPart], Field(min_length=1)] | None = Field(
         default=None, description="The part of each robot, by its name; all run at the same time."
     )
-    always: Annotated[
-        Branch, Field(description="Steps at the end in any case, also when the mission is cancelled.")
-    ] = ()
+    always: Annotated[Branch, Field(description="Steps at the end in any case, also when it is cancelled.")] = ()
     while_: Annotated[While | None, Field(alias="while", description="Condition that must hold meanwhile.")] = None
-    when: tuple[Handler, ...] | None = Field(
-        default=None, description="Conditions that interrupt the mission, the most important first."
-    )
+    when: tuple[Handler, ...] | None = Field(default=None, description="Conditions that interrupt it, by importance.")
     _notes: tuple[str, ...] = PrivateAttr(default=())
 
     @model_validator(mode="before")

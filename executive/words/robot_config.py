@@ -56,9 +56,7 @@ class NamedRobot(Strict):
     dock: Name | None = Field(
         None, description="The place where it charges; by default the world's dock for the first, else where it begins."
     )
-    stack: Name | None = Field(
-        None, description="A stack file, as seen from this file's folder; by default its kind's."
-    )
+    stack: Name | None = Field(None, description="A stack file, seen from this file's folder; by default its kind's.")
 
 
 _SHORT: Final = BeforeValidator(

@@ -65,18 +65,14 @@ class OperatorQuestion(Strict):
     """Question to the operator for `on_failure: ask`."""
 
     text: Text | None = Field(default=None, description="The question; by default it says what failed and why.")
-    limit_s: Annotated[
-        Duration, Field(alias="limit", description="Seconds on the robot's clock to wait for an answer.")
-    ] = 60.0
+    limit_s: Annotated[Duration, Field(alias="limit", description="Wait for an answer (s, robot's clock).")] = 60.0
     default: Literal["skip", "stop"] = Field(default="stop", description="The answer when nobody answers in time.")
 
 
 class Policy(Strict):
     """Policy of a step or mission: timeout, retries, reaction to a failure, guards."""
 
-    timeout_s: Annotated[
-        Duration | None, Field(alias="timeout", description="Seconds on the robot's clock for each attempt.")
-    ] = None
+    timeout_s: Annotated[Duration | None, Field(alias="timeout", description="Time limit of each attempt (s).")] = None
     retries: Attempts | None = Field(default=None, description="How many more attempts after a failure.")
     on_failure: OnFailure | None = Field(
         default=None,
@@ -86,9 +82,7 @@ class Policy(Strict):
     )
     question: OperatorQuestion | None = Field(default=None, description="The question for `on_failure: ask`.")
     guards: Guards | None = Field(default=None, description="Guards that must hold while it runs.")
-    pick_ups: Objects | None = Field(
-        default=None, description="How often the robot picks up an object that it drops; by default, twice."
-    )
+    pick_ups: Objects | None = Field(default=None, description="Pick-ups of a dropped object at most; by default, two.")
     move_aside: Objects | None = Field(
         default=None,
         description="How many objects that block every grasp the robot may move aside on their surface; "

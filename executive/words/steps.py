@@ -62,18 +62,14 @@ else:
     Steps = Annotated[tuple[AnyStep, ...], Field(min_length=1)]
     Branch = Annotated[Steps, WrapValidator(_none_is_empty, json_schema_input_type=Steps | None)]
 """Sequence of steps; a branch may be empty."""
-_ELSE: Final = Field(
-    alias="else", description="The steps when the condition of `if` does not hold, or when `try` failed."
-)
+_ELSE: Final = Field(alias="else", description="The steps when the condition of `if` does not hold, or `try` failed.")
 
 
 class Choose(Step):
     """`if`: runs the steps of `then` when the condition holds, otherwise those of `else`, which may be empty."""
 
     key: ClassVar[str] = "if"
-    condition: Annotated[
-        Condition, Field(alias="if", description="A condition that decides between `then` and `else`.")
-    ]
+    condition: Annotated[Condition, Field(alias="if", description="Condition that decides between `then` and `else`.")]
     then: Annotated[Steps, Field(description="The steps when the condition of `if` holds.")]
     otherwise: Annotated[Branch, _ELSE] = ()
 
@@ -88,9 +84,7 @@ class Loop(Strict):
 
     times: Count | None = Field(default=None, description="How many rounds; with a condition, how many at most.")
     until: Condition | None = Field(default=None, description="Rounds are made until this holds after one.")
-    while_: Annotated[
-        Condition | None, Field(alias="while", description="Rounds are made as long as this holds before one.")
-    ] = None
+    while_: Annotated[Condition | None, Field(alias="while", description="Rounds begin while this holds.")] = None
     until_clock: Clock | None = Field(default=None, description='Rounds begin until this time of day, as in "18:00".')
     every_s: Annotated[
         Duration | None,
@@ -200,9 +194,7 @@ class While(Strict):
 class Handler(Strict):
     """Condition that interrupts a group or a mission, with the steps that run then."""
 
-    condition: Annotated[
-        Condition, Field(alias="if", description="When this begins to hold, the steps are interrupted.")
-    ]
+    condition: Annotated[Condition, Field(alias="if", description="When this begins to hold, it interrupts the steps.")]
     steps: Annotated[Steps, Field(alias="do", description="The steps to run then; afterwards the others go on.")]
     times: Count = Field(default=10, description="How often at most; once more is a failure.")
 
@@ -213,14 +205,9 @@ class Group(Step):
     key: ClassVar[str] = "group"
     steps: Annotated[Steps, Field(alias="group", description="Steps in a row that share a policy.")]
     name: Name | None = Field(default=None, description="What the group is called.")
-    always: Annotated[
-        Branch,
-        Field(description="Steps at the end of the group in any case, also when the mission is cancelled."),
-    ] = ()
+    always: Annotated[Branch, Field(description="Steps at the group's end in any case, also when cancelled.")] = ()
     while_: Annotated[While | None, Field(alias="while", description="Condition that must hold meanwhile.")] = None
-    when: tuple[Handler, ...] | None = Field(
-        default=None, description="Conditions that interrupt the group, the most important first."
-    )
+    when: tuple[Handler, ...] | None = Field(default=None, description="Conditions that interrupt it, by importance.")
     zones: Zones | None = Field(default=None, description=ZONES)
 
     @property
@@ -265,18 +252,12 @@ class Ask(Answering):
 
     key: ClassVar[str] = "ask"
     ask: Text = Field(description="A question to the people around, or to the operator.")
-    choices: Choices | None = Field(
-        default=None, description="The answers to choose from, perhaps with the steps that each leads to."
-    )
+    choices: Choices | None = Field(default=None, description="Answers to choose from, perhaps with steps of each.")
     match: Literal["place", "person", "object", "number", "text"] | None = Field(
         default=None, description="Type of the answer, where there are no choices."
     )
-    limit_s: Annotated[Duration, Field(alias="limit", description="Time to wait for an answer (s, robot's clock).")] = (
-        60.0
-    )
-    default: Scalar = Field(
-        default=None, description="The answer when nobody answers in time; without one the step fails."
-    )
+    limit_s: Annotated[Duration, Field(alias="limit", description="Wait for an answer (s, robot's clock).")] = 60.0
+    default: Scalar = Field(default=None, description="Answer when nobody answers in time; without one the step fails.")
 
     @field_validator("default", mode="before")
     @classmethod

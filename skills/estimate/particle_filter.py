@@ -85,9 +85,8 @@ class ParticleFilter:
         field, self._standable = _likelihood_field(grid, options), _standable(grid)
         self._fields = field, float(field.min()), self._standable
         if not self._standable.any():
-            raise InputError(
-                "the map has no free ground where a robot could be", hint="check its picture and thresholds"
-            )
+            what = "the map has no free ground where a robot could be"
+            raise InputError(what, hint="check its picture and thresholds")
         self._slow = self._fast = 0.0
         self.poses: FloatArray = np.empty((0, 3))
         self.weights: FloatArray = np.empty(0)

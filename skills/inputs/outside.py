@@ -170,9 +170,7 @@ def plain_text(text: str, *, what: str, longest: int = LONGEST_TEXT) -> str:
     if len(text) > longest:
         hint = f"{longest} letters at most"
         raise InputError(f"{what} has {len(text)} letters", hint=hint)
-    wrong = next(
-        (letter for letter in text if letter not in _BLANKS and unicodedata.category(letter) in ("Cc", "Cs")), None
-    )
+    wrong = next((c for c in text if c not in _BLANKS and unicodedata.category(c) in ("Cc", "Cs")), None)
     if wrong is not None:
         kind = "half of a character" if unicodedata.category(wrong) == "Cs" else "a control character"
         shown = "".join(letter if letter.isprintable() else "?" for letter in text[:_SHOWN])

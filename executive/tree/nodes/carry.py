@@ -76,9 +76,7 @@ def put_down_plan(builder: PlanBuilder, item: ObjectKind, place: str) -> tuple[N
     """
     surfaces = builder.knowledge.surfaces_in(place)
     if not surfaces:
-        raise builder.error(
-            f"'{place}' has no surface to put the {item} on", "add one under 'surfaces' in the knowledge"
-        )
+        raise builder.error(f"'{place}' has no surface to put the {item} on", "add one to its 'surfaces'")
     to = f"to the {place}"
     each = tuple(_put_on_plan(builder.at(name), item, name, to) for name in surfaces)
     put = builder.first_of(f"put the {item} down {place_phrase(builder.knowledge, place)}", *each)

@@ -262,9 +262,7 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     brought = set(builder.knowledge.surfaces_in(builder.place(goal))) if goal is not None else set()
     if item is not None and brought & set(surfaces_to_search(builder.knowledge, item, builder.place(get.goal))):
         hint = "name the surface that they are to be taken from"
-        raise builder.error(
-            f"{several} that lie in the {get.goal} already look like those that are brought there", hint
-        )
+        raise builder.error(f"{several} that lie in the {get.goal} already look like those brought there", hint)
     trips = []
     for number in range(1, count + 1):
         trip = builder.at(f"trip-{number}")

@@ -60,10 +60,8 @@ def go_near_plan(builder: PlanBuilder, pose: Pose2D | FromBoard, to: str) -> Nod
     """
     nearby = _nearby(builder, pose)
     direct = builder.navigate(pose, to, nearby_m=tuple(nearby))
-    others = [
-        builder.at(f"nearby-{n}").navigate(other, f"a place near {to}")
-        for n, other in enumerate(nearby.values(), start=1)
-    ]
+    numbered = enumerate(nearby.values(), start=1)
+    others = [builder.at(f"nearby-{n}").navigate(other, f"a place near {to}") for n, other in numbered]
     if not others:
         return direct
     return builder.first_of(f"go to {to}, or near it", direct, *others, part="or-near", one_goal=True)
@@ -124,9 +122,7 @@ def _nearby(builder: PlanBuilder, pose: Pose2D | FromBoard) -> dict[tuple[float,
         return {offset: BesideBoard(pose.key, *offset) for offset in NEARBY_M}
     rooms = [outline for outline in builder.knowledge.rooms.values() if inside(outline, (pose.x_m, pose.y_m))]
     poses = {offset: compose(pose, Pose2D(*offset, 0.0)) for offset in NEARBY_M}
-    return {
-        offset: other for offset, other in poses.items() if any(inside(room, (other.x_m, other.y_m)) for room in rooms)
-    }
+    return {at: pose for at, pose in poses.items() if any(inside(room, (pose.x_m, pose.y_m)) for room in rooms)}
 
 
 def pick_up_plan(

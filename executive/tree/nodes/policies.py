@@ -351,7 +351,6 @@ def under_policy(
             return builder.node("ask", "ask if it fails", below, part="ask", step=words, options=options, **asked)
         case OnFailure.RETURN:
             back = builder.at("return")
-            return back.node(
-                "go back", "go back if it fails", below, back.navigate(FromBoard(back.start_key), "the start")
-            )
+            drive = back.navigate(FromBoard(back.start_key), "the start")
+            return back.node("go back", "go back if it fails", below, drive)
     return below

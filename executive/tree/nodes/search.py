@@ -120,9 +120,7 @@ class Answer(ExplainedDecorator):
             distinct_objects([self.board.get(key) for leaf, key in keys.items() if leaf in done])
             for keys in (self.tallies, self.doubts)
         )
-        unknown = tuple(
-            one for one in unknown if all(math.dist(one.position_W, f.position_W) > SAME_WITHIN_M for f in found)
-        )
+        unknown = tuple(u for u in unknown if all(math.dist(u.position_W, f.position_W) > SAME_WITHIN_M for f in found))
         enough = len(found) >= self.needed
         if self.count_key:
             self.board.put(self.count_key, float(len(found)))
@@ -342,9 +340,7 @@ def required_surfaces(builder: PlanBuilder, item: ObjectKind, place: str | None)
     """Returns the surfaces to search. Raises InputError when the place has no surfaces."""
     surfaces = surfaces_to_search(builder.knowledge, item, place)
     if place in builder.knowledge.bins:
-        raise builder.error(
-            f"the robot neither looks into the {place} nor takes anything out of it", "name a surface or a room"
-        )
+        raise builder.error(f"the robot neither looks into the {place} nor takes things out", "name a surface or room")
     if not surfaces and surfaces_left_out(builder.knowledge, item):
         raise builder.error(f"no place is left to look for {item}", "name a place where it may be")
     if not surfaces:

@@ -24,9 +24,7 @@ from skills.api import Asked, Cause, Failed, Question
 from skills.inputs.errors import InputError, suggestion
 
 SPEECH_TOPIC: Final = "speech"
-_FILLERS: Final = re.compile(
-    r"^(the|a|an|in|to|at|some|please|i want|i would like|it is)\s+|\s+(please|thanks|thank you)$"
-)
+_FILLERS: Final = re.compile(r"^(the|an?|in|to|at|some|please|i want|i would like|it is)\s+|\s+(please|thank(s| you))$")
 
 
 class AskPeople(ExplainedLeaf):

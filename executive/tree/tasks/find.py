@@ -34,18 +34,15 @@ class Find(TaskPage):
     def promise(self, command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
         """The answer is right."""
         assert command.object is not None
-        who = knowledge.somebody(command.object.name)
+        who, asked, count = knowledge.somebody(command.object.name), str(command.object), command.object_count
+        place = None if command.goal is None else knowledge.place(command.goal)
         if who is not None:
-            place = None if command.goal is None else knowledge.place(command.goal)
             rooms = tuple(Region(name, knowledge.rooms[name]) for name in knowledge.rooms_to_search(who, place))
             person = None if who == ANYBODY else who
-            return GoalCondition(
-                GoalKind.ANSWERED, (ANYBODY,), command.object_count, rooms, person=person, wanted=str(command.object)
-            )
+            return GoalCondition(GoalKind.ANSWERED, (ANYBODY,), count, rooms, person=person, wanted=asked)
         classes, regions = classes_of(command.object, knowledge), regions_of(command, knowledge, elsewhere)
-        place = None if command.goal is None else knowledge.place(command.goal)
         around = [name for name in knowledge.rooms if place in (None, name)]
         floors = tuple(Region(f"the floor of the {name}", knowledge.rooms[name], *FLOOR_M) for name in around)
-        asked, meant = str(command.object), in_world(command.object.relations, knowledge, command.goal)
-        count, floors = command.object_count, () if meant else floors
+        meant = in_world(command.object.relations, knowledge, command.goal)
+        floors = () if meant else floors
         return GoalCondition(GoalKind.ANSWERED, classes, count, regions, wanted=asked, maybe=floors, relations=meant)

@@ -33,9 +33,7 @@ class Wait(TaskPage):
 
         command = builder.command
         if command.item is not None:
-            raise builder.error(
-                f"the {command.item} cannot be carried by waiting", "take it there in a step of its own"
-            )
+            raise builder.error(f"the {command.item} cannot be carried by waiting", "take it there in its own step")
         duration_s = command.amount or 0.0
         if not 0.0 < duration_s <= LONGEST_WAIT_S:
             what = "a wait lasts a day at most" if duration_s else "it is not said for how long to wait"

@@ -266,10 +266,8 @@ class SpotSearch:
         lacks_m = _ENOUGH_CLEARANCE_M - np.minimum(clearances_m(seen, free), _ENOUGH_CLEARANCE_M)
         drive_m, other_m = (np.linalg.norm(each - here_W, axis=1) for each in (free, unseen))
         costs = [drive_m + _PER_CLEARANCE * lacks_m, other_m]
-        ordered = [
-            spots_W[np.argsort(cost, kind="stable")] for spots_W, cost in zip((free, unseen), costs, strict=True)
-        ]
-        spots = np.concatenate(ordered)
+        both = zip((free, unseen), costs, strict=True)
+        spots = np.concatenate([spots_W[np.argsort(cost, kind="stable")] for spots_W, cost in both])
         for tried in self._tried:
             spots = spots[np.linalg.norm(spots - tried, axis=1) > _ANOTHER_M]
         return spaced_spots(spots)

@@ -86,9 +86,7 @@ CLASSIFIER: Final = NetworkKind(
     _crop_inputs,
 )
 """Classifies the refined regions."""
-_EXPORTED: Final = replace(
-    PROPOSAL, hint="name an ONNX file; yolo export model=FILE format=onnx makes one of a .pt file"
-)
+_EXPORTED: Final = replace(PROPOSAL, hint="name an ONNX file; yolo export model=FILE.pt format=onnx makes one")
 
 
 @dataclass(frozen=True)

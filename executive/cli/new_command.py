@@ -133,12 +133,12 @@ def render_task(name: str, folder: Path) -> tuple[Path, ...]:
 
 def _unsayable(spoken: str) -> str | None:
     """Returns why the words of a new task cannot be said; None if they can."""
-    from executive import parse
+    import executive
     from executive.language.clauses import cut, trailing_cue
 
     said = f"{spoken} the kitchen"
     for sentence in (said, spoken, f"{spoken} every room", f"{spoken} the beer"):
-        if parse(sentence).all_steps:
+        if executive.parse(sentence).all_steps:
             return f"'{sentence}' is a sentence of Errand already"
     whole = [clause.text for clause in cut(said)] == [said] and trailing_cue(said) is None
     return None if whole else f"'{said}' is no plain request"

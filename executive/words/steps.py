@@ -340,10 +340,7 @@ _PARTS: Final = MappingProxyType({"task": "do", "item": "take", "goal": "to", "o
 
 
 def _as_command(data: Mapping[Any, Any]) -> Mapping[Any, Any]:
-    """Writes `do: {task: vacuum, goal: kitchen}` and `vacuum: kitchen` as the parts of a command.
-
-    The text of the short form is the task's object, or its goal when the task has no object.
-    """
+    """Writes both forms of a task, `do: {task: vacuum, goal: kitchen}` and `vacuum: kitchen`, as parts of a command."""
     words = [key for key in data if key not in _KEYS and is_task(key)]
     said = {key: value for key, value in data.items() if key not in words and key != "do"}
     if len(words) + ("do" in data) > 1:

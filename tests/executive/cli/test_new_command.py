@@ -60,7 +60,7 @@ def test_a_package_with_a_task_is_three_files_and_ninety_lines(tmp_path):
     ("name", "message"),
     [
         ("grasp", "exists"),
-        ("speak", "exists"),
+        ("speak", "missions have a step of this name"),
         ("Sweep", "cannot be the name"),
         ("go", "'go the kitchen' is a sentence of Errand already; choose a verb"),
         ("patrol", "'patrol every room' is a sentence of Errand already"),

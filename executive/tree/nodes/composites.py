@@ -12,7 +12,7 @@ from py_trees.common import Status
 
 from executive.mission.gripper import held_after_either
 from executive.tree.assembly import Assembler, StepPlans, words_of
-from executive.tree.behaviour import MemoryComposite, applies, cause_of, failed_for_good, message_of
+from executive.tree.behaviour import MemoryComposite, applies, cause_of, failed_for_good, looked, message_of
 from executive.tree.board import Board
 from executive.tree.estimate import Estimate, Walk
 from executive.tree.node import NodeSpec
@@ -25,6 +25,7 @@ from skills.api import Cause, Part
 from skills.inputs.errors import InputError
 
 _MERELY_NOT_SO = frozenset({Cause.PRECONDITION, Cause.POSTCONDITION})
+_NOR: Final = ", nor "
 
 
 class MemorySequence(MemoryComposite):
@@ -58,7 +59,8 @@ class MemorySelector(MemoryComposite):
     child failed with ERROR, else the first cause that is neither PRECONDITION nor POSTCONDITION, else `exhausted_cause`
     if given, else the cause of the last child, or PRECONDITION if no child applied. Children behind the first `needed`
     are an extra, and only their ERROR counts. With `one_goal` all children lead to the same goal: after a final failure
-    of one child, the others are skipped.
+    of one child, the others are skipped. `looks` has the path ids of the looks at each place: where none of a place was
+    taken, the message says that the robot could not look there, and names the others.
     """
 
     kind = "selector"
@@ -67,6 +69,9 @@ class MemorySelector(MemoryComposite):
     goes_on_after: ClassVar[tuple[Status, ...]] = (Status.FAILURE, Status.INVALID)
     exhausted_cause: Cause | None = None
     exhausted_message: str = ""
+    looks: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    missed: str = ""
+    sought: str = ""
     one_goal: bool = False
     needed: int | None = None
 
@@ -88,7 +93,7 @@ class MemorySelector(MemoryComposite):
     def _explanation(self, child: Behaviour) -> tuple[Cause, str]:
         failed = [one for one in self.children if one.status == Status.FAILURE]
         if not failed:
-            return self.exhausted_cause or Cause.PRECONDITION, self.exhausted_message or "nothing of it applies"
+            return self.exhausted_cause or Cause.PRECONDITION, self._summary() or "nothing of it applies"
         causes, needed = [cause_of(one) for one in failed], self.children[: self.needed]
         obstacles = [cause_of(one) for one in failed if one in needed and cause_of(one) not in _MERELY_NOT_SO]
         cause = Cause.ERROR if Cause.ERROR in causes else next(iter(obstacles), self.exhausted_cause or causes[-1])
@@ -97,7 +102,15 @@ class MemorySelector(MemoryComposite):
         sentences = list(dict.fromkeys(map(message_of, tried)))
         more = f"; and {len(sentences) - 4} more" if len(sentences) > 4 else ""
         shown = f"{'; '.join(sentences[:4])}{more}"
-        return cause, f"{self.exhausted_message}: {shown}" if self.exhausted_message else shown
+        return cause, ": ".join(filter(None, (self._summary(), shown)))
+
+    def _summary(self) -> str:
+        seen = [place for place, leaves in self.looks.items() if looked(self, leaves)]
+        unseen = [place for place in self.looks if place not in seen]
+        if not unseen:
+            return self.exhausted_message
+        text = f"{self.missed} {_NOR.join(seen)}; could not look" if seen else f"could not look for {self.sought}"
+        return f"{text} {_NOR.join(unseen)}"
 
 
 class MemoryRound(MemorySelector):

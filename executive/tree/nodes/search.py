@@ -8,7 +8,7 @@ from typing import ClassVar, Final
 
 from py_trees.common import Status
 
-from executive.tree.behaviour import Explained, ExplainedDecorator
+from executive.tree.behaviour import Explained, ExplainedDecorator, looked
 from executive.tree.board import Board, FromBoard, SurfaceOfDetection
 from executive.tree.context import ANSWER_TOPIC
 from executive.tree.goals import surfaces_left_out, surfaces_to_search
@@ -106,7 +106,7 @@ class Answer(ExplainedDecorator):
         if status == Status.RUNNING:
             return status
         nodes = {node.path_id: node for node in self.iterate() if isinstance(node, Explained)}
-        unseen = [surface for surface, leaves in self.looks.items() if not _looked(leaves, nodes)]
+        unseen = [surface for surface, leaves in self.looks.items() if len(looked(self, leaves)) < len(leaves)]
         if self.tallies:
             return self._counted(nodes, unseen)
         if status == Status.FAILURE and unseen:
@@ -146,12 +146,6 @@ class Answer(ExplainedDecorator):
         note = {"node": self.path_id, "question": self.question, "answer": answer, "message": self.message}
         self.publish(ANSWER_TOPIC, note)
         return Status.SUCCESS
-
-
-def _looked(leaves: Sequence[str], nodes: Mapping[str, Explained]) -> bool:
-    """Returns whether each of these leaves took a look, even if it found nothing."""
-    looks = [nodes.get(leaf) for leaf in leaves]
-    return all(look and (look.status == Status.SUCCESS or look.cause == Cause.POSTCONDITION) for look in looks)
 
 
 def surfaces_elsewhere(
@@ -273,8 +267,10 @@ def search_plan(
     rest = surfaces[len(first) :]
     looks = (*look_plans(builder, item, first, key, floor), *look_plans(builder, item, rest, key, likely))
     further = look_plans(builder.at("elsewhere"), item, elsewhere, key, likely)
-    looked, meant = place_phrase(builder.knowledge, place), bool(builder.relations(item.relations))
-    looked += f", nor on the {listing(elsewhere)}" if elsewhere and not meant else ""
+    aside = tuple(_looks_from_aside(builder, item, surfaces, key))
+    meant = bool(builder.relations(item.relations))
+    missed, where = f"{'did not find the one' if meant else 'found no'} {item}", place_phrase(builder.knowledge, place)
+    where += f", nor on the {listing(elsewhere)}" if elsewhere and not meant else ""
     needed = (
         find_again_plan(builder.at("again"), item, (*surfaces, *elsewhere), key),
         *_looks_at_last_known(builder.at("last-known"), item, key),
@@ -283,13 +279,20 @@ def search_plan(
     return builder.first_of(
         f"find the {item}",
         *needed,
-        *_looks_from_aside(builder, item, surfaces, key),
+        *(look for _, look in aside),
         *(look for _, look in further),
         exhausted_cause=Cause.PRECONDITION,
-        exhausted_message=f"{'did not find the one' if meant else 'found no'} {item} {looked}",
+        exhausted_message=f"{missed} {where}",
+        looks={f"on the {name}": leaves for name, leaves in _leaves((*looks, *aside, *further)).items()},
+        missed=missed,
+        sought=f"the {item}",
         one_goal=meant,
         needed=len(needed),
     )
+
+
+def _leaves(looks: Sequence[tuple[str, NodeSpec]]) -> dict[str, tuple[str, ...]]:
+    return {place: tuple(look.children[-1].path_id for name, look in looks if name == place) for place, _ in looks}
 
 
 def last_known_floor(builder: PlanBuilder, item: ObjectKind) -> Surface | None:
@@ -313,7 +316,7 @@ def _looks_at_last_known(builder: PlanBuilder, item: ObjectKind, key: str) -> It
 
 def _looks_from_aside(
     builder: PlanBuilder, item: ObjectKind, surfaces: tuple[str, ...], key: str
-) -> Iterator[NodeSpec]:
+) -> Iterator[tuple[str, NodeSpec]]:
     """Yields additional looks from the side, at surfaces that have only one viewpoint."""
     facts = builder.knowledge.surfaces
     single = [name for name in surfaces if len(facts[name].viewpoints) == 1]
@@ -325,7 +328,7 @@ def _looks_from_aside(
         if aside is not None:
             below = builder.at(f"{name}-aside")
             look = detect_plan(below, item, (name,), key)
-            yield below.look_from(f"look at the {name} from aside", aside, f"the side of the {name}", look)
+            yield name, below.look_from(f"look at the {name} from aside", aside, f"the side of the {name}", look)
 
 
 def surfaces_first_known(builder: PlanBuilder, item: ObjectKind, place: str | None) -> tuple[str, ...]:
@@ -381,7 +384,6 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
     below = builder.at("search")
     title = f"look for {what if what == ANYTHING else asked}"
     search = below.node("round" if counting else "selector", title, *(look for _, look in looks))
-    leaves = {s: tuple(look.children[-1].path_id for name, look in looks if name == s) for s, _ in looks}
     tallies, doubts = (
         {
             leaf.path_id: leaf.options["outputs"][port]
@@ -404,7 +406,7 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
         search,
         question=asked if place is None else f"{asked} {spot}",
         denied=denied,
-        looks=MappingProxyType(leaves),
+        looks=MappingProxyType(_leaves(looks)),
         key=answer_key or builder.key("answer"),
         tells=place is None,
         tallies=MappingProxyType(tallies),

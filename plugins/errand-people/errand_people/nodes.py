@@ -283,7 +283,8 @@ def meet_plan(builder: PlanBuilder, person: str, place: str | None = None) -> No
     beside = _go_beside(here, person, met)
     near = here.node("only if near", f"{person} is near", beside, key=met, area_W=area_W)
     ports = {"area_W": knowledge.rooms[said], "place": said}
-    there = _in_room(builder.at(said), said, _meet_one_plan(builder.at(said), person, ports))
+    there = _in_room(builder.at(said), said, meet := _meet_one_plan(builder.at(said), person, ports))
+    missed = f"{person} is not"
     if place is not None:
         further = [builder.node("last seen", f"where was {person}?", part="last", person=person, key=met)]
     else:
@@ -294,7 +295,10 @@ def meet_plan(builder: PlanBuilder, person: str, place: str | None = None) -> No
         there,
         *further,
         exhausted_cause=Cause.POSTCONDITION,
-        exhausted_message=f"{person} is not found" if place is None else f"{person} is not in the {said}",
+        exhausted_message=f"{missed} found" if place is None else f"{missed} in the {said}",
+        looks={} if place is None else {f"in the {said}": (meet.children[0].path_id,)},
+        missed=missed,
+        sought=person,
     )
 
 

@@ -189,6 +189,13 @@ def test_a_person_at_a_place_is_met_there_alone_and_else_last_seen_elsewhere(res
     assert ("Robin was last seen at (4.00, 1.00) in the kitchen" in result.message) == (len(texts) == 2)
 
 
+def test_robot_that_reached_no_room_does_not_deny_that_the_person_is_there(result_of, script):
+    script.ends["navigate"] = lambda skill: Failed(Cause.PLANNING, "the way is blocked")
+    result = result_of(TO_BEDROOM)
+    assert result.message.startswith("could not look for Robin in the bedroom: ")
+    assert "the way is blocked" in result.message
+
+
 def test_a_person_who_left_is_looked_for_again(result_of, there, script):
     there["Robin"] = (4.0, 1.0, "kitchen")
     leave = lambda skill: there.update(Robin=(0.0, 0.0, "hall")) or Succeeded("said")  # noqa: E731

@@ -57,6 +57,25 @@ def test_an_exhausted_selector_has_the_decisive_cause_and_reports_all_that_began
     assert (root.cause, root.message) == (CAUSES[cause], message)
 
 
+# looks on the table (a, b), on the shelf (c) and in the hall (d)
+@pytest.mark.parametrize(
+    ("scripts", "message"),
+    [
+        ("OOOO", "found no cup anywhere: a O; b O; c O; d O"),
+        ("OPOO", "found no cup anywhere: b P; a O; c O; d O"),  # one view of the table is enough
+        ("PPOO", "found no cup on the shelf, nor in the hall; could not look on the table: a P; b P; c O; d O"),
+        ("PTOF", "found no cup on the shelf; could not look on the table, nor in the hall: a P; b T; c O; d F"),
+        ("PPPP", "could not look for the cup on the table, nor on the shelf, nor in the hall: a P; b P; c P; d P"),
+    ],
+)
+def test_an_exhausted_search_names_where_it_looked_and_where_it_could_not(scripts, message):
+    looks = {"on the table": ("alice/a", "alice/b"), "on the shelf": ("alice/c",), "in the hall": ("alice/d",)}
+    told = {"exhausted_message": "found no cup anywhere", "missed": "found no cup", "sought": "the cup"}
+    root = composite("selector", *scripts, looks=looks, **told)
+    table(root, 1)
+    assert root.message == message
+
+
 @pytest.mark.parametrize(("kind", "first"), [("sequence", "S"), ("selector", "F")])
 def test_interruption_stops_what_runs_and_keeps_what_is_done(kind, first):
     root = composite(kind, first, "RR", "S")

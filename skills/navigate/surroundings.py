@@ -1,7 +1,7 @@
 """Perception for the navigate skill: obstacles, people, doors, other robots, and the robot's own footprint."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -9,7 +9,6 @@ import numpy as np
 from skills.api import ClearableCostmap, FreeSpace, SkillContext
 from skills.doorway import Doorway
 from skills.footprint import Footprint, outline_distances_m, pose_array, with_discs
-from skills.geometry import bearing_rad
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.collision_guard import CollisionGuard, GuardOptions
 from skills.navigate.cut_off import DoorOptions, DoorWatch
@@ -191,8 +190,6 @@ class NavigateOptions:
 
 
 _OUTLINE_PERIOD_S = 0.5
-_AHEAD_RAD = 1.0
-"""Bearing to either side up to which a person may block the robot."""
 _WALKED_M = 0.5
 """Length of a track from which on it counts as a person rather than an object."""
 
@@ -266,12 +263,12 @@ class Surroundings:
         people = self._people.people() if self._company is None else self._company.others()
         return tuple(one for one in people if not self.robots.is_robot(one.place_W))
 
-    def blocker(self, reach_m: float) -> SeenPerson | None:
-        """The nearest person ahead of the robot within reach_m; None without one, or where a door is closed."""
+    def nearest_person(self, reach_m: float, blocks: Callable[[SeenPerson], bool]) -> SeenPerson | None:
+        """The nearest person who `blocks`, within reach_m; None without one, or where a door is closed."""
         here = self._context.pose()
-        away_m = {math.dist(one.place_W, (here.x_m, here.y_m)): one for one in self.people_by_shape()}
-        ahead = [m for m, one in away_m.items() if m < reach_m and abs(bearing_rad(here, one.place_W)) < _AHEAD_RAD]
-        return away_m[min(ahead)] if ahead and not self.doors.closed else None
+        away_m = {math.dist(one.place_W, (here.x_m, here.y_m)): one for one in self.people_by_shape() if blocks(one)}
+        nearest_m = min(away_m, default=math.inf)
+        return away_m[nearest_m] if nearest_m < reach_m and not self.doors.closed else None
 
     def people_by_shape(self) -> Sequence[SeenPerson]:
         """The people nearby, or those too near for the cameras: what has the shape of a person in the scan."""

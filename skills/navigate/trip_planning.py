@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from skills.api import Cause, ClearableCostmap, Job, SkillContext, say
-from skills.geometry import compose
+from skills.geometry import bearing_rad, compose
 from skills.navigate.cut_off import closed_doors_sentence
 from skills.navigate.door_openers import DoorCalls
 from skills.navigate.giving_way import Avoided
@@ -23,8 +23,12 @@ EARSHOT_M = 3.0
 """Distance up to which a person who leaves no path is asked to make way."""
 _CLOSE_M = 1.4
 """Distance up to which a person is asked although there may be another path."""
+_AHEAD_RAD = 1.0
+"""Bearing to either side up to which a close person may block the robot."""
 _AT_GOAL_M = 0.8
-"""Distance from the goal within which a person does not block the robot, but may be whom it meets."""
+"""Distance from the goal within which a person close ahead does not block the robot, but may be whom it meets."""
+_BESIDE_M, _BEHIND_GOAL_M = 0.7, 0.4
+"""Distance from the path within which a person blocks it, and from its end within which nobody does."""
 _PERSON_M = 0.45
 """Radius of a person's obstacles."""
 
@@ -100,7 +104,8 @@ class TripPlanning:
     ) -> None:
         self._context, self._options, self._inputs, self._around = context, options, inputs, around
         self._job: Job[Path] | None = None
-        self._map_alone = self._map_leads = self._looked_again = self._waited = self._detours = False
+        self._map_path: Path | None = None
+        self._map_alone = self._looked_again = self._waited = self._detours = False
         self._suspected = False
         self._replans = 0
         self._people, self._robots = _Presence(options.after_person_s), _Presence(options.after_person_s)
@@ -119,11 +124,18 @@ class TripPlanning:
         """The present goal: the waiting pose if there is one, else the goal of the inputs."""
         return self.aside or self._inputs.goal
 
-    def blocker(self, reach_m: float | None = None) -> SeenPerson | None:
-        """The person who blocks the robot: close ahead, or in earshot where there is a path without that person."""
-        person = self._around.blocker(reach_m or (EARSHOT_M if self._map_leads else _CLOSE_M))
-        goal_W = self.goal.x_m, self.goal.y_m
-        return None if person is None or math.dist(person.place_W, goal_W) < _AT_GOAL_M else person
+    def blocker(self) -> SeenPerson | None:
+        """The person who blocks the robot: in earshot on the path that the map alone gives, without one close ahead."""
+        return self._around.nearest_person(_CLOSE_M if self._map_path is None else EARSHOT_M, self._blocks)
+
+    def _blocks(self, person: SeenPerson) -> bool:
+        goal_W = np.array((self.goal.x_m, self.goal.y_m))
+        if self._map_path is None:
+            ahead = abs(bearing_rad(self._context.pose(), person.place_W)) < _AHEAD_RAD
+            return ahead and math.dist(person.place_W, goal_W) >= _AT_GOAL_M
+        places = self._map_path.poses[:, :2]
+        away_m = np.linalg.norm(places - person.place_W, axis=1)
+        return bool(away_m.min() < _BESIDE_M and math.dist(places[away_m.argmin()], goal_W) > _BEHIND_GOAL_M)
 
     @property
     def under_way(self) -> bool:
@@ -156,7 +168,7 @@ class TripPlanning:
 
     def retarget(self, inputs: NavigateInputs, start: Pose2D | None) -> None:
         """Plans to another goal, unless the robot waits aside, and forgets earlier failures."""
-        self._inputs, self._replans, self._map_leads, self.wait_until_s = inputs, 0, False, -math.inf
+        self._inputs, self._replans, self._map_path, self.wait_until_s = inputs, 0, None, -math.inf
         self._suspected = False
         if self.aside is None:
             self.avoided = Avoided.PATHS
@@ -178,7 +190,7 @@ class TripPlanning:
         job, self._job = self._job, None
         path = job.result()
         if self._map_alone:
-            self._map_alone, self._map_leads = False, True
+            self._map_alone, self._map_path = False, path
             self.wait_until_s = self._now() + self._options.replan_pause_s
             return None
         self.obstacle_W, self._waited = None, False
@@ -282,7 +294,7 @@ class TripPlanning:
             final = not may_go and self._around.cut_off(self._goals)
             raise SkillFailure(Cause.PLANNING, why + seen, final=final)
         self.wait_until_s = self._now() + self._options.replan_pause_s
-        if robot and not self._map_leads and isinstance(self._context.costmap, ClearableCostmap):
+        if robot and self._map_path is None and isinstance(self._context.costmap, ClearableCostmap):
             self.ask(map_alone=True)
 
     def _waits_for_blocker(self) -> bool:
@@ -290,8 +302,10 @@ class TripPlanning:
 
         Raises SkillFailure when the person has not made way.
         """
-        person, costmap = self.blocker(EARSHOT_M), self._context.costmap
-        if not isinstance(costmap, ClearableCostmap) or (self._suspected and not self._map_leads):
+        person, costmap = self.blocker(), self._context.costmap
+        if not self._suspected and self._map_path is None:
+            person = self._around.nearest_person(EARSHOT_M, lambda one: True)
+        if not isinstance(costmap, ClearableCostmap) or (self._suspected and self._map_path is None):
             return False
         if person is None and (left_W := self.pass_request.awaited_W) is not None:
             costmap.clear_obstacles(np.array([[*left_W, _PERSON_M]]))  # the LiDAR may not see that they have left

@@ -127,6 +127,27 @@ def test_a_door_blocked_by_a_person_is_a_planning_failure_after_long_patience():
     assert drive.bench.robot.least_clearance_m > 0.1
 
 
+# the robot with its back to the person in the door, and with its goal just behind the person
+@pytest.mark.parametrize(
+    ("start", "goal"),
+    [
+        (Pose2D(7.45, 5.5, math.pi / 2), Pose2D(7.5, 2.0, -math.pi / 2)),
+        (Pose2D(7.45, 5.5, -math.pi / 2), Pose2D(7.5, 3.45, -math.pi / 2)),
+    ],
+)
+def test_robot_asks_the_person_without_whom_there_is_a_path(start, goal):
+    drive = Drive([person_at(7.45, 4.0)], start=start, goal=goal, options=NavigateOptions(person_patience_s=2.0))
+    said = [message["text"] for topic, message in drive.bench.published if topic == "speech"]
+    assert said == ["May I pass, please?"] * 2
+    assert drive.step.cause is Cause.PLANNING
+
+
+def test_robot_does_not_ask_a_person_who_blocks_no_path():
+    drive = Drive([person_at(3.0, 5.4)], start=BEFORE_DOOR, goal=GOAL)
+    assert isinstance(drive.step, Succeeded)
+    assert not [topic for topic, _ in drive.bench.published if topic == "speech"]
+
+
 def test_robot_stops_for_a_person_who_steps_into_its_path():
     person = person_at(6.9, 5.4)
 

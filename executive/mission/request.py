@@ -132,7 +132,8 @@ class Request:
     The run begins at `time_of_day` ("14:30"; None: now) and ends after `time_limit_s` (None: the default).
 
     The fields below `robots` are set once the request is understood. Then another process can run it: the sentence
-    contains the answers, `text` is the file's text, and `scenario` holds the content of its files and the drawn faults.
+    contains the answers, `text` is the file's text, and `scenario` holds the content of its files and the drawn faults;
+    `given_scenario` keeps both fields of the scenario as the user gave them.
     """
 
     sentence: Annotated[
@@ -247,6 +248,7 @@ class Request:
     commands: tuple[str, ...] = ()
     fingerprint: str = ""
     text: str | None = None
+    given_scenario: tuple[Scenario, tuple[Path, ...]] | None = None
 
     @property
     def only_commands(self) -> bool:

@@ -83,4 +83,6 @@ def request_arguments(request: Request) -> list[str]:
 
 def command_of(request: Request) -> str:
     """Returns the command line that repeats the run of this request, whose `out` is that run's own folder."""
-    return shlex.join(["errand", "run", *request_arguments(dataclasses.replace(request, out=Request.out))])
+    scenario, files = request.given_scenario or (request.scenario, request.scenario_files)
+    asked = dataclasses.replace(request, out=Request.out, scenario=scenario, scenario_files=files)
+    return shlex.join(["errand", "run", *request_arguments(asked)])

@@ -55,7 +55,8 @@ def with_scenario(request: Request, world: World, knowledge: Knowledge, robots: 
             raise InputError(f"another scenario has an event of {min(twice)}", hint="keep one of them", file=path)
         scenario = scenario.merge(_with_doorways(read, world))
     drawn = random_faults(scenario.random, request.seed, cameras)
-    return replace(request, scenario=scenario.with_drawn(drawn), scenario_files=())
+    given = request.given_scenario or (request.scenario, request.scenario_files)
+    return replace(request, scenario=scenario.with_drawn(drawn), scenario_files=(), given_scenario=given)
 
 
 def with_events(world: World, scenario: Scenario, seed: int = 0) -> World:

@@ -10,6 +10,7 @@ import pytest
 from executive.app.prepare.scenarios import doorway, read_scenario, with_events, with_scenario
 from executive.app.prepare.worlds import knowledge_of, open_world
 from executive.mission.request import Request
+from executive.mission.request_fields import command_of
 from executive.mission.scenario import Scenario
 from executive.words.knowledge import Door, Knowledge, ObjectFacts, Person, Place, Pose, SurfaceFacts
 from executive.words.mission import Route
@@ -45,6 +46,13 @@ def test_random_faults_are_drawn_from_the_seed_and_only_once():
     assert (asked, len(asked.scenario.faults)) == (again, 3)
     assert asked.scenario.faults != other.scenario.faults
     assert with_scenario(asked, WORLD, KNOWLEDGE, ["Alice"]) == asked
+
+
+def test_the_line_that_repeats_a_run_names_the_scenario_as_it_was_given(file):
+    asked = understood(scenario_files=(file,), scenario=Scenario(("arm refuses",), random=2), seed=4)
+    given = f"errand run --say=go --seed=4 '--fault=arm refuses' --random-faults=2 --scenario={file}"
+    assert command_of(asked) == command_of(Request.from_json(asked.to_json())) == given
+    assert command_of(with_scenario(asked, WORLD, KNOWLEDGE, ["Alice", "Bob"])) == given
 
 
 def test_a_fault_of_a_camera_that_spot_does_not_have_is_refused():

@@ -61,6 +61,9 @@ class RobotSetup(Strict):
         description="scripted: exact and fast; plant: the simulated Spot in the small room, with physics",
     )
     pose: PoseSetup = Field(default=PoseSetup(), description="start pose (scripted only)")
+    before: tuple[Coordinate, Coordinate] | None = Field(
+        default=None, description="point (x, y) that it faces from its arm's best standing distance (scripted only)"
+    )
     arm: tuple[Angle, ...] | None = Field(
         default=None, description="arm angles, rad; by default stowed (scripted only)"
     )
@@ -262,6 +265,8 @@ def bench_of_setup(
 ) -> tuple[SkillBench, ScriptedRobot]:
     """Builds a bench with the scripted robot and the world that a file describes; returns both."""
     pose = Pose2D(setup.pose.x, setup.pose.y, setup.pose.yaw)
+    if setup.before is not None and capabilities.arm is not None:
+        pose = Pose2D(setup.before[0] - capabilities.arm.standing_m[0], setup.before[1], 0.0)
     start = Start(pose, setup.arm, setup.in_gripper, setup.holding, setup.charge, setup.docked, setup.pulled_at_s)
     doors = tuple(door.doorway for door in world.doors)
     return scripted_bench(capabilities, start, blocks_of(world), localised=not setup.lost, doors=doors)

@@ -7,7 +7,14 @@ from typing import ClassVar
 
 import pytest
 
-from executive.testing.skill_test import carry_out, load_skill_tests, scripted_maker
+from executive.testing.skill_test import (
+    RobotSetup,
+    WorldSetup,
+    bench_of_setup,
+    carry_out,
+    load_skill_tests,
+    scripted_maker,
+)
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 from skills.inputs.errors import InputError
 from skills.robot import Pose2D
@@ -109,3 +116,10 @@ def test_a_wrong_file_is_refused_with_its_line(written, case):
     with pytest.raises(InputError, match=re.escape(case["message"])) as refused:
         load_skill_tests(path, SKILLS)
     assert (refused.value.file, refused.value.line) == (path, case["line"])
+
+
+def test_the_robot_stands_before_a_point_at_its_arms_best_distance(robot_capabilities):
+    _, robot = bench_of_setup(robot_capabilities, RobotSetup(before=(1.38, 0.5)), WorldSetup())
+    best_m = robot_capabilities.arm.standing_m[0]
+    place = robot.pose
+    assert (place.x_m, place.y_m, place.yaw_rad) == pytest.approx((1.38 - best_m, 0.5, 0.0))

@@ -12,6 +12,9 @@ from errand_make.robots.tree import KinematicTree
 from plant.robots.urdf_robot.urdf_file import UrdfJoint
 from skills.robot import FloatArray
 
+_OVER_TABLES_M: Final = (0.82, 0.9)
+"""Heights of a hand that carries over a table."""
+_APART_M: Final = 0.05
 _NEAR_M: Final = 0.03
 
 
@@ -93,9 +96,11 @@ def hand_axes(tree: KinematicTree, last: UrdfJoint) -> dict[str, str]:
 def arm_places(x_m: float, z_m: float, reach_m: float, tip_m: float, front_m: float) -> dict[str, Any]:
     """Working distances of an arm with its shoulder at x_m and z_m of the body, as parts of its length.
 
-    They are those of Spot and Fetch: stands, nearer stands, carrying positions, and positions close to the body.
+    They are those of Spot and Fetch: stands, nearer stands, carrying positions, and positions close to the body. An
+    arm whose shoulder is low also carries over the tables before which it stands.
     """
     whole = reach_m + tip_m
+    heights = [z_m + each for each in (0.07, 0.13, 0.19, 0.25, 0.31, 0.39, 0.47)]
 
     def ahead(shares: Sequence[float]) -> list[float]:
         return [rounded(max(front_m + 0.1, x_m + share * whole)) for share in shares]
@@ -106,7 +111,7 @@ def arm_places(x_m: float, z_m: float, reach_m: float, tip_m: float, front_m: fl
         "standing": ahead((0.64, 0.675, 0.605, 0.71, 0.57, 0.535, 0.745, 0.78)),
         "nearer": ahead((0.53, 0.495, 0.46, 0.425)),
         "carry_x": [rounded(x_m + share * whole) for share in (0.42, 0.375, 0.33, 0.465, 0.51)],
-        "carry_z": [rounded(z_m + each) for each in (0.07, 0.13, 0.19, 0.25, 0.31, 0.39, 0.47)],
+        "carry_z": [rounded(z) for z in (*heights, *(z for z in _OVER_TABLES_M if z > heights[-1] + _APART_M))],
         "tuck_x": [rounded(front_m + each) for each in (0.02, 0.07)],
     }
 

@@ -57,11 +57,7 @@ def render_robot(name: str, urdf: Path, folder: Path, *, packages: Mapping[str, 
         line = error.line if error.file == home / "robot.urdf" else None
         raise InputError(error.message, hint=error.hint, file=urdf, line=line) from error
     height_m = can.lidar_height_m or 0.0
-    words = {
-        "low": f"{height_m - _BAND_M:.2f}",
-        "high": f"{height_m + _BAND_M:.2f}",
-        "grasp_x": f"{1.38 - (0.0 if can.arm is None else can.arm.standing_m[0]):.2f}",
-    }
+    words = {"low": f"{height_m - _BAND_M:.2f}", "high": f"{height_m + _BAND_M:.2f}"}
     lacking = [] if can.arm is not None else ["look", "stow"]
     lacking += [] if can.object_camera is not None else ["look"]
     lacking += [] if can.object_camera is not None and can.gripper is not None else ["take", "grasp"]

@@ -8,6 +8,8 @@ import pytest
 from rover_urdf import write_package
 
 from errand_make.robots.package import render_robot
+from executive.testing.skill_test import carry_out, load_skill_tests, scripted_maker
+from executive.tree.registry import installed_skills
 from plant.robots.urdf_robot.kind import urdf_kind
 from skills.inputs.errors import InputError
 from skills.inputs.yaml_source import read_yaml
@@ -94,3 +96,25 @@ def test_a_urdf_that_the_plant_cannot_use_is_refused_with_its_line(rover_urdf, t
     with pytest.raises(InputError, match=message) as refused:
         render_robot("rover", rover_urdf, tmp_path / "made", packages={})
     assert refused.value.file == rover_urdf and refused.value.line and refused.value.hint
+
+
+# the arm as it is; with short links; with a low shoulder
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {'xyz="0.40 0 0"': 'xyz="0.32 0 0"', 'xyz="0.36 0 0"': 'xyz="0.28 0 0"', "0.38 0.07": "0.3 0.07"},
+        {'xyz="0.12 0 0.42"': 'xyz="0.12 0 0.27"'},
+    ],
+)
+def test_the_written_test_of_the_grasp_succeeds_whatever_the_arm(rover_urdf, tmp_path, changes):
+    text = rover_urdf.read_text()
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    rover_urdf.write_text(text)
+    render_robot("rover", rover_urdf, tmp_path / "made", packages={})
+    can, skills = urdf_kind(tmp_path / "made/errand_robot_rover/robot.yaml").capabilities(), installed_skills()
+    written = load_skill_tests(tmp_path / "made/tests/grasp.skilltest.yaml", skills)
+    trial = carry_out(written, 0, skills["grasp"], {"scripted": scripted_maker(can)})
+    assert trial.differences == (), trial.report()

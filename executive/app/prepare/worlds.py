@@ -106,7 +106,7 @@ def crossing_rooms(world: World, knowledge: Knowledge) -> tuple[InputError, ...]
 
 
 def unsayable_names(world: World, knowledge: Knowledge) -> tuple[InputError, ...]:
-    """Warnings on names of a user's world that no sentence can say, such as "#" or "please"."""
+    """Warnings on names of a user's world that no sentence can say, such as "please", or that mean two things."""
     if world.folder.is_relative_to(WORLDS_FOLDER):
         return ()
     from executive.language.parser import load_parser
@@ -123,6 +123,11 @@ def unsayable_names(world: World, knowledge: Knowledge) -> tuple[InputError, ...
         commands = understand(sentence, parser=parser, knowledge=knowledge, require_wake=False).commands
         if not commands or any(path[1] not in (each.goal, each.object and each.object.name) for each in commands):
             found.append(source.error(path, f"{'.'.join(path)}: no sentence can say this name", hint))
+    named = [(key, name) for key in ("places", "surfaces", "things", "people") for name in getattr(knowledge, key)]
+    taken = {name.lower(): f"the robot '{name}'" for name in knowledge.robots or (knowledge.robot.name,)}
+    for path in named:
+        if (other := taken.setdefault(path[1].lower(), ".".join(path))) != ".".join(path):
+            found.append(source.error(path, f"{'.'.join(path)}: {other} has the same name", "rename one of them"))
     return tuple(found)
 
 

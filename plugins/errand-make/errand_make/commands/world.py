@@ -149,8 +149,8 @@ def add(
     _warn_of_names(folder)
 
 
-def _warn_of_names(folder: Path) -> None:
-    """Warns of names of a world that no sentence can say."""
+def _warn_of_names(folder: Path | str) -> None:
+    """Warns of names of a world that no sentence can say, or that mean two things."""
     changed = open_world(str(folder))
     for each in unsayable_names(changed, knowledge_of(changed)):
         typer.echo(f"errand: warning: {each}", err=True)
@@ -261,9 +261,9 @@ def show(
 
 @world.command("check")
 def check_world(folder: Annotated[str, typer.Argument(metavar="WORLD", help="A world by name or folder.")]) -> None:
-    """Checks the files of a world: maps, models, knowledge, and that each person stands free."""
+    """Checks the files of a world: maps, models, knowledge, names, and that each person stands free."""
     checked = open_world(folder)
-    knowledge_of(checked)
+    _warn_of_names(folder)
     refuse_unusable(checked)
     typer.echo(f"{folder}: can be used")
 

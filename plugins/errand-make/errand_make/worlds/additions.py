@@ -58,8 +58,8 @@ def _add_object(site: Site, wanted: Wanted) -> str:
         what = f"there is no surface '{wanted.surface}'" if wanted.surface else "an object lies on a surface"
         raise InputError(what, hint=f"name it by --on: {listing(surfaces)}" if surfaces else "add a table first")
     thing, folder = _model(site, wanted.name)
-    furnish.add_object(site.folder, wanted.name, str(found), thing=thing, model=folder)
-    return f"{wanted.name} on the {found}"
+    own = furnish.add_object(site.folder, site.world, wanted.name, str(found), thing=thing, model=folder)
+    return f"{wanted.name} on the {found}" + ("" if own == wanted.name else f", as '{own}'")
 
 
 def _model(site: Site, name: str) -> tuple[str, Path | None]:

@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import count
 from os.path import relpath
 from pathlib import Path
 from typing import Any, Final
@@ -252,19 +253,23 @@ def _directives(file: Path, name: str, pose: Pose2D) -> str:
 """
 
 
-def add_object(folder: Path, name: str, surface: str, *, thing: str, model: Path | None) -> None:
-    """Adds an object that the seed places on a surface, and its usual place to the knowledge. Raises WorldError.
+def add_object(folder: Path, world: World, name: str, surface: str, *, thing: str, model: Path | None) -> str:
+    """Adds an object that the seed places on a surface, and its usual place to the knowledge; returns its name.
 
-    `thing` is the class of its model, and `model` a folder that the world is to import.
+    `name` is that of its model, which further objects have with a number, `thing` the class of the model, and `model` a
+    folder that the world is to import. Raises WorldError.
     """
     facts, rules = folder / "knowledge.yaml", folder / "objects.yaml"
-    if thing == name or thing not in (read_yaml(facts).data.get("things") or {}):
+    taken = {each.name for each in world.seed_rules.objects} | {each.name for each in world.seed_rules.people}
+    own = name if name not in taken else next(each for k in count(2) if (each := f"{name}_{k}") not in taken)
+    if thing not in (read_yaml(facts).data.get("things") or {}):
         known = read_yaml(open_world(_COMMON_FACTS).knowledge_path).data["things"].get(thing, {})
         write_text(facts, with_entry(facts, "things", thing, {**known, "usual": [surface]}))
     if model is not None:
         write_text(rules, with_entry(rules, "imports", None, relpath(model.resolve(), folder.resolve()), usual=_RULES))
-    rule = {"name": name, "model": name, "surfaces": [surface]}
+    rule = {"name": own, "model": name, "surfaces": [surface]}
     write_text(rules, with_entry(rules, "objects", None, rule, usual=_RULES))
+    return own
 
 
 def people_W(world: World) -> list[tuple[str, Point]]:

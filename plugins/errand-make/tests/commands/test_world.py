@@ -79,6 +79,28 @@ def test_a_name_that_no_sentence_can_say_is_warned_of(own):
     assert "knowledge.yaml" in added.stderr and "places.#: no sentence can say this name" in added.stderr
 
 
+def test_one_name_for_two_parts_of_a_world_is_warned_of(own):
+    add("place", own, "Kim", "--at", 3.5, 1.5, 1.57)
+    told = "people.Kim: places.Kim has the same name"
+    assert told in done("world", "add", "person", own, "Kim").stderr
+    assert told in done("world", "check", own).stderr
+    added = done("world", "add", "place", own, "alice", "--at", 3, 1.5, 0)
+    assert "the robot 'Alice' has the same name" in added.stderr
+        "the robot 'Alice' has the same name" in done("world", "add", "place", own, "alice", "--at", 3, 1.5, 0).stderr
+    )
+
+
+def test_a_further_object_of_a_model_has_a_number(own):
+    add("table", own, "bench", "--in", "room 1")
+    said = [add("object", own, "beer", "--on", "bench") for _ in range(3)]
+    assert [each.strip().partition(": ")[2] for each in said] == [
+        "beer on the bench", "beer on the bench, as 'beer_2'", "beer on the bench, as 'beer_3'",
+    ]  # fmt: skip
+    assert {name: model for name, (model, _) in lying(load_world(str(own)), 1).items()} == {
+        "beer": "beer", "beer_2": "beer", "beer_3": "beer",
+    }  # fmt: skip
+
+
 @pytest.mark.parametrize("kind", ["table", "desk", "shelf"])
 def test_furniture_stands_at_a_wall_and_the_robot_finds_an_object_on_it(own, kind):
     add(kind, own, "big one", "--in", "room 1")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import json
 import logging
 import secrets
 import socket
@@ -15,6 +16,7 @@ from typing import Any, Final, Self
 
 import uvicorn
 from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect, HTTPConnection, Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import BaseRoute, Route
@@ -59,6 +61,12 @@ class _Connection(H11Protocol):
             timer.cancel()
             self._every[self] = None
 
+    def send_400_response(self, msg: str) -> None:
+        body = json.dumps({"error": msg}).encode()
+        head = f"HTTP/1.1 400 Bad Request\r\ncontent-type: application/json\r\ncontent-length: {len(body)}\r\n"
+        self.transport.write(f"{head}connection: close\r\n\r\n".encode() + body)
+        self.transport.close()
+
     def _forget_closed(self) -> None:
         for each in [each for each in self._every if each.transport.is_closing()]:
             if (timer := self._every.pop(each)) is not None:
@@ -91,6 +99,14 @@ def url_of(host: str, port: int) -> str:
     return f"http://[{host}]:{port}/" if ":" in host else f"http://{host}:{port}/"
 
 
+async def _say_error(request: Request, error: Exception) -> Response:
+    """Answers a request that no handler took, or whose handler failed, with a JSON object like all refusals."""
+    status, headers = HTTPStatus(getattr(error, "status_code", 500)), dict(getattr(error, "headers", None) or {})
+    allowed = f"; use {headers['Allow']}" if "Allow" in headers else ""
+    said = f"{request.method} {request.url.path}: {status.phrase.lower()}{allowed}"
+    return JSONResponse({"error": said}, status, headers)
+
+
 class Server:
     """Running server of routes in a thread of its own. Use it as a context manager, or call `close`.
 
@@ -101,7 +117,7 @@ class Server:
         """Starts serving on an open socket; `settings` are settings of uvicorn."""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._ready = threading.Event()
-        app = Starlette(routes=routes)
+        app = Starlette(routes=routes, exception_handlers={HTTPException: _say_error, Exception: _say_error})
         self._connections: dict[_Connection, asyncio.TimerHandle | None] = {}
         self._errors: set[str] = set()
         protocol: Any = partial(_Connection, self._connections)

@@ -33,6 +33,8 @@ def few(monkeypatch):
 @pytest.fixture
 def server(calls):
     def called(name, body):
+        if name == "broken":
+            raise RuntimeError("a defect")
         if name == "full":
             raise CallError(HTTPStatus.TOO_MANY_REQUESTS, "100 wait already")
         calls.append((name, body))
@@ -99,6 +101,27 @@ def test_nothing_else_is_served(server, calls):
     for method, name in (("GET", "patrol"), ("PUT", "patrol"), ("POST", "a/b"), ("POST", "")):
         assert ask(server, method, name)[0] in (404, 405), (method, name)
     assert calls == []
+
+
+@pytest.mark.parametrize(
+    ("method", "name", "status", "said"),
+    [
+        ("GET", "patrol", 405, "GET /missions/patrol: method not allowed; use POST"),
+        ("POST", "a/b", 404, "POST /missions/a/b: not found"),
+        ("POST", "broken", 500, "POST /missions/broken: internal server error"),
+    ],
+)
+def test_the_server_says_every_error_as_json(server, method, name, status, said):
+    found, answer = ask(server, method, name)
+    assert (found, json.loads(answer)) == (status, {"error": said})
+
+
+def test_the_server_says_as_json_that_a_request_is_no_http(server):
+    with socket.create_connection(("127.0.0.1", server.port), timeout=10) as client:
+        client.sendall(b"hello\r\n\r\n")
+        head, _, body = client.makefile("rb").read().partition(b"\r\n\r\n")
+    assert b"400 Bad Request" in head and b"application/json" in head
+    assert set(json.loads(body)) == {"error"}
 
 
 def test_the_server_listens_only_at_its_own_address(server):

@@ -86,8 +86,6 @@ def test_one_name_for_two_parts_of_a_world_is_warned_of(own):
     assert told in done("world", "check", own).stderr
     added = done("world", "add", "place", own, "alice", "--at", 3, 1.5, 0)
     assert "the robot 'Alice' has the same name" in added.stderr
-        "the robot 'Alice' has the same name" in done("world", "add", "place", own, "alice", "--at", 3, 1.5, 0).stderr
-    )
 
 
 def test_a_further_object_of_a_model_has_a_number(own):

@@ -120,6 +120,11 @@ class Control:
         self._hold(robot, Mode.PAUSED, "pause", reason)
 
     @property
+    def cancelled(self) -> bool:
+        """Returns whether the run has been cancelled."""
+        return self._requests.cancel is not None
+
+    @property
     def pause_reason(self) -> str | None:
         """Reason why all robots are paused; None while they are not."""
         return self._holds.get((None, Mode.PAUSED))

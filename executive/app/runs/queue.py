@@ -215,10 +215,13 @@ class MissionRuns:
         return MissionResult(mission.id, MissionState.ERROR.value, False, cause)
 
     def cancel(self, reason: str) -> None:
-        """Cancels the mission under way and all later ones. Signal handlers may call it."""
+        """Cancels the mission under way and all later ones. Signal handlers may call it.
+
+        A mission that the same signal has cancelled goes on with its steps under `always`.
+        """
         self._cancelled = reason
         self._stopped.set()
-        if self._control is not None:
+        if self._control is not None and not self._control.cancelled:
             self._control.cancel(reason)
 
     def _run(self, mission: StoredMission, prepared: Prepared | None) -> MissionResult:

@@ -2,6 +2,7 @@
 
 import errno
 import resource
+import signal
 from contextlib import contextmanager
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from executive.app.report.run_report import RunReport
 from executive.app.runs.one_run import FinishedRun
 from executive.app.runs.queue import MissionRuns, RunOptions
+from executive.app.runs.signals import ended_by_signals
 from executive.mission.request import Request
 from executive.run.control import Control
 from executive.store.missions import MissionState, MissionStore
@@ -141,6 +143,16 @@ class TestMissionRuns:
 
         begun = runs(start)
         assert begun.run(mission).message == "cancelled by SIGINT"
+
+    def test_a_signal_that_ends_the_queue_and_its_mission_leaves_time_for_always(self, runs, mission):
+        def start(prepared, *, control, **_):
+            with ended_by_signals(begun.cancel), ended_by_signals(control.cancel):
+                signal.raise_signal(signal.SIGTERM)
+            insisted.append(control.poll().insists)
+            return cancelled_by_control(prepared, control=control)
+
+        begun, insisted = runs(start), []
+        assert (begun.run(mission).message, insisted) == ("cancelled by SIGTERM", [False])
 
 
 def succeeded(prepared):

@@ -179,14 +179,17 @@ PROGRAMS = (
     ),
     Program(
         "frame_trajectory_command/frame_trajectory_command.py --dx 2.5 --frame odom",
-        (Promise("x", ((0.75,),), 0.1, rests_s=3.0),),
-        exit_code=1,  # a wall stands 1.5 m ahead
+        (Promise("x", ((0.75,),), 0.1, rests_s=3.0),),  # a wall stands 1.5 m ahead: the program takes a rest for the goal
         start=(8.6, 3.9, 1.5708),
     ),
     Program(
         "user_nogo_regions/user_nogo_regions.py",
         (Promise("x", ((0.25,),), 0.1, rests_s=2.0), Promise("x", ((0.3,), (2.0,), (0.0,)), 0.15)),
         start=(9.09, 3.79, -0.785),
+    ),
+    Program(
+        "joint_control/wiggle_arm.py",
+        (Promise("in_body_x in_body_z", ((0.54, 0.31), (0.46, 0.17), (0.54, 0.31), (0.44, 0.49), (0.54, 0.31)), 0.06),),
     ),
     Program(
         "docking/dock_my_robot.py --dock-id 520",
@@ -217,9 +220,7 @@ REFUSED = {
     "disable_ir_emission": _refused(
         "disable_ir_emission.py HOST --disable", "IREnableDisableService", 'Service name "ir-enable-disable-service"'
     ),
-    "joint_control": _refused(
-        "noarm_squat.py HOST", "RobotCommandStreamingService", "JointControlStream is not served", exit_code=None
-    ),
+    "joint_control": _refused("noarm_squat.py HOST", "a stream for 12 joints of a robot that has 19", "", exit_code=0),
     "payloads": _refused(
         "payloads.py HOST --payload-credentials-file-1 PAYLOAD --payload-credentials-file-2 PAYLOAD",
         "PayloadRegistrationService",

@@ -1,8 +1,8 @@
 """gRPC services from plain classes, with one place for headers, tokens and malformed messages.
 
 A service is a class whose methods have the names of the API's calls. Each takes the request and the `Call`, and returns
-the response; a stream of requests comes as a list, and a stream of responses is returned as an iterable. Calls of the
-API that the class lacks are answered with UNIMPLEMENTED and their names.
+the response. A stream of requests comes as a list, or as it arrives to a `live` service; a stream of responses is
+returned as an iterable. Calls of the API that the class lacks are answered with UNIMPLEMENTED and their names.
 """
 
 from __future__ import annotations
@@ -49,6 +49,8 @@ class Service:
     needs_token: ClassVar[bool] = True
     checks_values: ClassVar[bool] = False
     """Whether its calls check values themselves, because the API has a status for that."""
+    live: ClassVar[bool] = False
+    """Whether its calls take the messages of a stream as they arrive."""
 
 
 def handlers(services: Sequence[Service], user_of: UserOf, now: Callable[[], float]) -> list[grpc.GenericRpcHandler]:
@@ -91,9 +93,11 @@ class _ServiceHandler:
             received_s, user = self._now(), self._user_of(_token(context)) if self._service.needs_token else ""
             if user is None:
                 context.abort(grpc.StatusCode.UNAUTHENTICATED, "401: the token is missing, not valid or expired")
-            requests = _collected(given if method.client_streaming else (given,), context)
+            live = self._service.live and method.client_streaming
+            several = given if method.client_streaming else (given,)
+            requests = [request_type()] if live else _collected(several, context)
             call = Call(user or "", requests[0].header.client_name, received_s)
-            asked = requests if method.client_streaming else requests[0]
+            asked = _arriving(given) if live else requests if method.client_streaming else requests[0]
 
             def answered() -> Any:
                 if not (self._service.checks_values or method.client_streaming):
@@ -102,7 +106,10 @@ class _ServiceHandler:
 
             def responses() -> Iterator[Any]:
                 for response, error in self._answered(answered, response_type, many=method.server_streaming):
-                    _fill_header(response, requests[0], error, received_s, self._now())
+                    if "header" in response.DESCRIPTOR.fields_by_name:
+                        _fill_header(response, requests[0], error, received_s, self._now())
+                    elif error.code != header_pb2.CommonError.CODE_OK:
+                        context.abort(grpc.StatusCode.INVALID_ARGUMENT, error.message)
                     yield response
 
             return responses() if method.server_streaming else next(responses())
@@ -125,6 +132,14 @@ class _ServiceHandler:
         except Exception as failed:
             _LOG.exception("%s failed", self._service.type)
             yield response_type(), Error(code=Error.CODE_INTERNAL_SERVER_ERROR, message=str(failed))
+
+
+def _arriving(given: Iterable[Any]) -> Iterator[Any]:
+    """Yields requests as they arrive. Raises InvalidRequestError for a malformed one."""
+    for request in given:
+        if request is _MALFORMED:
+            raise InvalidRequestError("the message cannot be parsed")
+        yield request
 
 
 def _collected(given: Iterable[Any], context: grpc.ServicerContext) -> list[Any]:

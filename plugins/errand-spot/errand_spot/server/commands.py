@@ -14,7 +14,7 @@ from typing import Any, Final
 from bosdyn.api import basic_command_pb2, estop_pb2, full_body_command_pb2, lease_pb2, power_pb2, robot_command_pb2
 
 from errand_spot.messages import InvalidRequestError, seconds, timestamp
-from errand_spot.server import arm, gripper, hand, mobility
+from errand_spot.server import arm, gripper, hand, joint_control, mobility
 from errand_spot.server.calls import Call, Service
 from errand_spot.server.computer import Computer, Motion, Motors, Snapshot
 from errand_spot.server.identity import DOMAIN, TimeSyncService
@@ -123,8 +123,10 @@ class RobotCommandService(Service):
     name, type, authority = "robot-command", "bosdyn.api.RobotCommandService", f"command.{DOMAIN}"
     checks_values = True
 
-    def __init__(self, computer: Computer, leases: LeaseService, clocks: TimeSyncService) -> None:
-        self._computer, self._leases, self._clocks = computer, leases, clocks
+    def __init__(
+        self, computer: Computer, leases: LeaseService, clocks: TimeSyncService, updates: joint_control.Updates
+    ) -> None:
+        self._computer, self._leases, self._clocks, self._updates = computer, leases, clocks, updates
         self._ids, self._lock = count(1), Lock()
         self._commands: dict[int, _Commanded] = {}
 
@@ -165,12 +167,16 @@ class RobotCommandService(Service):
         """Starts a command and returns its number. Raises RefusedError or InvalidRequestError."""
         command, computer, snapshot = request.command, self._computer, self._computer.snapshot
         check_values(command, "command")
-        whole = _whole_motion(command.full_body_command) if command.HasField("full_body_command") else None
-        if not computer.able and (whole is None or command.full_body_command.HasField("selfright_request")):
+        moves = command.full_body_command.WhichOneof("command") in (None, "selfright_request", "joint_request")
+        if not computer.able and moves:
             if snapshot.motors is not Motors.ON or computer.fault is None:
                 raise RefusedError(Status.STATUS_NOT_POWERED_ON, "the motors are off, or an E-stop is pressed")
             raise RefusedError(Status.STATUS_BEHAVIOR_FAULT, "the robot has fallen: clear its behaviour fault")
-        if whole is None and computer.docked() and _leaves_dock(command.synchronized_command):
+        whole: Any = None
+        if command.HasField("full_body_command"):
+            joints = command.full_body_command.HasField("joint_request")
+            whole = joint_control.activation(computer, self._updates) if joints else _whole_motion(command)
+        elif computer.docked() and _leaves_dock(command.synchronized_command):
             raise RefusedError(Status.STATUS_DOCKED, "the robot is docked: undock it first")
         parts: Mapping[str, Any] = {}
         if whole is None:
@@ -313,9 +319,10 @@ class _PowerOff(_Whole):
         self.feedback = made
 
 
-def _whole_motion(request: Any) -> _Whole:
+def _whole_motion(command: Any) -> _Whole:
     """Motion of the whole body. Raises RefusedError."""
-    made, which = full_body_command_pb2.FullBodyCommand.Feedback(), request.WhichOneof("command")
+    which = command.full_body_command.WhichOneof("command")
+    made = full_body_command_pb2.FullBodyCommand.Feedback()
     if which in ("stop_request", "freeze_request", "selfright_request"):
         made.selfright_feedback.status = basic_command_pb2.SelfRightCommand.Feedback.STATUS_COMPLETED
         getattr(made, which.replace("request", "feedback")).SetInParent()

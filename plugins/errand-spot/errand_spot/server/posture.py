@@ -12,9 +12,9 @@ from errand_spot.server.computer import Computer, Snapshot
 from errand_spot.server.refusals import times_of, unsupported
 from skills.robot import FloatArray, Pose2D
 
-_SHIFT_M, _TWIST_RAD = 0.12, 0.5
+SHIFT_M, TWIST_RAD = 0.12, 0.5
 """Largest shift and turn of the body over its feet; a robot clips what is larger, and so does this one."""
-_ROLL_RAD: Final = 0.15
+ROLL_RAD: Final = 0.15
 """Largest roll that a command may ask for; the body stays level."""
 _SHIFTED: Final = 0.01
 """Least shift (m) or turn (rad) that counts."""
@@ -45,8 +45,8 @@ class Posture:
             self._poses = [X if X_RN is None else X_RN @ X for X in poses]
         elif which == "body_pose":
             raise InvalidRequestError(f"{field} has no points")
-        if any(abs(RollPitchYaw(X.rotation()).roll_angle()) > _ROLL_RAD for X in self._poses):
-            raise unsupported(f"{field}: a roll of the body above {_ROLL_RAD:g} rad")
+        if any(abs(RollPitchYaw(X.rotation()).roll_angle()) > ROLL_RAD for X in self._poses):
+            raise unsupported(f"{field}: a roll of the body above {ROLL_RAD:g} rad")
 
     @property
     def last(self) -> tuple[float, float]:
@@ -74,7 +74,7 @@ class Posture:
         """Values (N, 5) of the poses over feet, within the robot's range: x, y, yaw, height, pitch."""
         X_FO = feet_O.transform().inverse()
         poses = self._poses if self._X_OR is None else [X_FO @ self._X_OR @ X for X in self._poses]
-        most = np.array([_SHIFT_M, _SHIFT_M, _TWIST_RAD])
+        most = np.array([SHIFT_M, SHIFT_M, TWIST_RAD])
         low, high = self._range.T
         return np.clip([self._values(X) for X in poses], [*-most, *low], [*most, *high])
 

@@ -11,7 +11,7 @@ from typing import Final
 
 import grpc
 
-from errand_spot.server import docking, identity, manipulation, pictures, rays, state, streams
+from errand_spot.server import docking, identity, joint_control, manipulation, pictures, rays, state, streams
 from errand_spot.server.calls import Service, handlers
 from errand_spot.server.commands import PowerService, RobotCommandService
 from errand_spot.server.computer import Computer, Pace, Solver
@@ -38,7 +38,6 @@ LISTED: Final[Mapping[str, str]] = {
     "map-processing-service": "bosdyn.api.graph_nav.MapProcessingService",
     "payload-registration": "bosdyn.api.PayloadRegistrationService",
     "recording-service": "bosdyn.api.graph_nav.GraphNavRecordingService",
-    "robot-command-streaming": "bosdyn.api.RobotCommandStreamingService",
     "spot-check": "bosdyn.api.spot.SpotCheckService",
 }
 """Services of a real Spot in the directory that answer UNIMPLEMENTED."""
@@ -47,7 +46,7 @@ SERVICES: Final = tuple(sorted(Service.__subclasses__(), key=lambda service: ser
 MOTIONS: Final = (
     "stand with height, pitch, turn and shift, sit, velocity, trajectory, follow arm, stance, stop, freeze, safe power "
     "off, self-right; the arm's joint moves, named positions, Cartesian moves, impedance without force, gaze, velocity "
-    "and stop; the gripper. Others are refused as unsupported."
+    "and stop; the gripper; joint control. Others are refused as unsupported."
 )
 """The motions of `RobotCommand`, in words."""
 _DESCRIBED_IN: Final = (
@@ -122,7 +121,7 @@ class SpotServer:
         self, leases: LeaseService, estop: EstopService, auth: identity.AuthService, robot_name: str, options: Options
     ) -> Sequence[Service]:
         """All implemented services; the directory lists them and the others."""
-        computer, clocks = self.computer, identity.TimeSyncService()
+        computer, clocks, updates = self.computer, identity.TimeSyncService(), joint_control.Updates()
         others = [(name, type_name, f"api.{DOMAIN}") for name, type_name in LISTED.items()]
         known = [(each.name, each.type, each.authority) for each in SERVICES]
         lacking = {state.InverseKinematicsService.name} if computer.solver is None else set()
@@ -150,7 +149,8 @@ class SpotServer:
             leases,
             KeepaliveService(computer),
             PowerService(computer, leases),
-            RobotCommandService(computer, leases, clocks),
+            RobotCommandService(computer, leases, clocks, updates),
+            joint_control.RobotCommandStreamingService(computer, updates),
             images,
             gripper_camera,
             rays.RayCastService(computer),
@@ -162,7 +162,7 @@ class SpotServer:
             state.PayloadService(),
             state.DataBufferService(),
             state.LogStatusService(),
-            streams.RobotStateStreamingService(computer),
+            streams.RobotStateStreamingService(computer, updates),
             streams.MissionService(),
             GraphNavService(computer, leases, clocks, options.perception, live),
         ]

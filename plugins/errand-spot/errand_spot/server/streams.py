@@ -10,28 +10,25 @@ from bosdyn.api import robot_state_pb2
 from bosdyn.api.mission import mission_pb2
 
 from errand_spot.messages import InvalidRequestError, our_joint, pose, timestamp, velocity
-from errand_spot.server.arm import JOINTS
 from errand_spot.server.calls import Call, Service
 from errand_spot.server.computer import Computer, Snapshot
 from errand_spot.server.identity import DOMAIN
+from errand_spot.server.joint_control import Updates, joint_names, positions
 from errand_spot.server.mobility import FEET_M
 
 _REPEATED_S: Final = 1.0
 """Longest time without a message of a stream, so that its end is noticed while the robot's clock stands."""
 _MOST_STREAMS: Final = 8
 """Most streams at a time: each occupies a thread of the server."""
-LEG_JOINTS: Final = tuple(f"{foot}.{joint}" for foot in FEET_M for joint in ("hx", "hy", "kn"))
-ARM_JOINTS: Final = tuple(f"arm0.{joint}" for joint in (*JOINTS, "f1x"))
-"""Joints in the order of the API's streams; those of the arm follow those of the legs."""
 
 
 class RobotStateStreamingService(Service):
-    """Streams joints and pose, a message after each step."""
+    """Streams joints, pose, and the last message of joint control, after each step."""
 
     name, type, authority = "robot-state-streaming", "bosdyn.api.RobotStateStreamingService", f"state.{DOMAIN}"
 
-    def __init__(self, computer: Computer) -> None:
-        self._computer, self._free = computer, Semaphore(_MOST_STREAMS)
+    def __init__(self, computer: Computer, updates: Updates) -> None:
+        self._computer, self._updates, self._free = computer, updates, Semaphore(_MOST_STREAMS)
 
     def GetRobotStateStream(self, _request: Any, _call: Call) -> Iterator[Any]:
         """Yields the state until the client ends the call."""
@@ -47,11 +44,13 @@ class RobotStateStreamingService(Service):
     def _state(self, snapshot: Snapshot) -> Any:
         made, joints, stamp = robot_state_pb2.RobotStateStreamResponse(), snapshot.joints, timestamp(snapshot.time_s)
         made.joint_states.acquisition_timestamp.CopyFrom(stamp)
-        for name in LEG_JOINTS + (ARM_JOINTS if self._computer.solver is not None else ()):
-            ours = our_joint(name)
-            made.joint_states.position.append(joints.position_rad.get(ours, 0.0))
-            made.joint_states.velocity.append(joints.velocity_rad_s.get(ours, 0.0))
-            made.joint_states.load.append(joints.effort_nm.get(ours, 0.0))
+        names = joint_names(self._computer)
+        made.joint_states.position.extend(positions(snapshot, names))
+        made.joint_states.velocity.extend(joints.velocity_rad_s.get(our_joint(name), 0.0) for name in names)
+        made.joint_states.load.extend(joints.effort_nm.get(our_joint(name), 0.0) for name in names)
+        if self._updates.received:
+            made.last_command.user_command_key = self._updates.last_key
+            made.last_command.received_timestamp.CopyFrom(timestamp(self._updates.last_s))
         kinematic, X_OB = made.kinematic_state, pose(snapshot.odometry.X_OB)
         kinematic.acquisition_timestamp.CopyFrom(stamp)
         kinematic.odom_tform_body.CopyFrom(X_OB)

@@ -85,6 +85,11 @@ class Spot:
     def tree(self):
         return self.states.get_robot_state().kinematic_state.transforms_snapshot
 
+    def client(self, kind):
+        """Client of a service that the SDK does not register by itself."""
+        self.robot.service_client_factories_by_type[kind.service_type] = kind
+        return self.robot.ensure_client(kind.default_service_name)
+
     def stands_again(self):
         """Puts the robot back to its start; returns whether that is possible: it may have lost power or lease."""
         computer = self.served.server.computer

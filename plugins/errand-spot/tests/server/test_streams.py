@@ -23,13 +23,8 @@ class MissionClient(BaseClient):
         return self.call(getattr(self._stub, call), request)
 
 
-def client_of(spot, kind):
-    spot.robot.service_client_factories_by_type[kind.service_type] = kind
-    return spot.robot.ensure_client(kind.default_service_name)
-
-
 def test_the_state_is_streamed_with_legs_and_arm_in_the_order_of_the_api(spot):
-    stream = client_of(spot, RobotStateStreamingClient).get_robot_state_stream()
+    stream = spot.client(RobotStateStreamingClient).get_robot_state_stream()
     first = next(stream)
     arm_rad = spot.served.scripted.q_rad
     assert len(first.joint_states.position) == len(first.joint_states.load) == 19
@@ -41,7 +36,7 @@ def test_the_state_is_streamed_with_legs_and_arm_in_the_order_of_the_api(spot):
 
 
 def test_streams_above_the_most_are_refused_until_another_ends(spot):
-    client = client_of(spot, RobotStateStreamingClient)
+    client = spot.client(RobotStateStreamingClient)
     streams = [client.get_robot_state_stream() for _ in range(8)]
     assert all(len(next(each).joint_states.position) == 19 for each in streams)
     refused = next(client.get_robot_state_stream()).header.error
@@ -57,7 +52,7 @@ Info, Play, Stop = mission_pb2.GetStateRequest, mission_pb2.PlayMissionRequest, 
 
 
 def test_no_mission_is_loaded_and_none_can_be_played(spot):
-    missions = client_of(spot, MissionClient)
+    missions = spot.client(MissionClient)
     state = missions.ask("GetState", Info()).state
     assert (state.status, state.mission_id) == (mission_pb2.State.STATUS_NONE, -1)
     assert missions.ask("PlayMission", Play()).status == mission_pb2.PlayMissionResponse.STATUS_NO_MISSION

@@ -179,8 +179,8 @@ PROGRAMS = (
     ),
     Program(
         "frame_trajectory_command/frame_trajectory_command.py --dx 2.5 --frame odom",
-        (Promise("x", ((0.75,),), 0.1, rests_s=3.0),),  # a wall stands 1.5 m ahead: the program takes a rest for the goal
-        start=(8.6, 3.9, 1.5708),
+        (Promise("x", ((0.75,),), 0.1, rests_s=3.0),),
+        start=(8.6, 3.9, 1.5708),  # a wall stands 1.5 m ahead; the program takes any rest for the goal
     ),
     Program(
         "user_nogo_regions/user_nogo_regions.py",
@@ -210,12 +210,11 @@ REFUSED = {
     "animation_recorder": _refused("animation_recorder.py HOST", "ChoreographyService"),
     "arm_force_control": _refused("force_trajectory.py HOST", "an axis in force mode", _UNSUPPORTED),
     "arm_impedance_control": _refused("arm_impedance_control_simple.py HOST", "a feed-forward wrench", _UNSUPPORTED),
-    "arm_surface_contact": _refused("arm_surface_contact.py HOST", "ArmSurfaceContactService"),
+    "arm_surface_contact": _refused("arm_surface_contact.py HOST", "an axis in force mode", "AXIS_MODE_FORCE"),
     "audio_visual": _refused(
         "audio_visual_params/audio_visual_params.py HOST", "AudioVisualService", 'Service name "audio-visual"'
     ),
     "auto_return": _refused("force_start_auto_return.py HOST", "AutoReturnService"),
-    "data_acquisition_service": _refused("data_acquisition_example.py HOST", "DataAcquisitionService"),
     "data_service": _refused("get_index.py HOST text", "DataService"),
     "disable_ir_emission": _refused(
         "disable_ir_emission.py HOST --disable", "IREnableDisableService", 'Service name "ir-enable-disable-service"'
@@ -236,6 +235,7 @@ REFUSED = {
 """Programs that the server refuses, by folder."""
 
 SERVED = {
+    "data_acquisition_service": Program("data_acquisition_example.py HOST", exit_code=1, says="STATUS_COMPLETE"),
     "data_buffer": Program("data_buffer.py HOST operator hello", says="Added operator comment"),
     "directory": Program("directory_modification.py HOST", says="robot-command"),
     "fan_command": Program("basic_fan_command.py HOST", exit_code=1, says="STATUS_COMPLETE"),

@@ -49,6 +49,8 @@ class Service:
     needs_token: ClassVar[bool] = True
     checks_values: ClassVar[bool] = False
     """Whether its calls check values themselves, because the API has a status for that."""
+    aborts: ClassVar[bool] = False
+    """Whether an error ends a call, because clients read no error in the header."""
     live: ClassVar[bool] = False
     """Whether its calls take the messages of a stream as they arrive."""
 
@@ -106,10 +108,11 @@ class _ServiceHandler:
 
             def responses() -> Iterator[Any]:
                 for response, error in self._answered(answered, response_type, many=method.server_streaming):
-                    if "header" in response.DESCRIPTOR.fields_by_name:
-                        _fill_header(response, requests[0], error, received_s, self._now())
-                    elif error.code != header_pb2.CommonError.CODE_OK:
+                    headed = "header" in response.DESCRIPTOR.fields_by_name
+                    if error.code != error.CODE_OK and (self._service.aborts or not headed):
                         context.abort(grpc.StatusCode.INVALID_ARGUMENT, error.message)
+                    if headed:
+                        _fill_header(response, requests[0], error, received_s, self._now())
                     yield response
 
             return responses() if method.server_streaming else next(responses())

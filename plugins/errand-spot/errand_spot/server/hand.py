@@ -207,6 +207,8 @@ class Impedance(Cartesian):
         wrench = request.feed_forward_wrench_at_tool_in_desired_tool
         if any((*vector(wrench.force, "force"), *vector(wrench.torque, "torque"))):
             raise unsupported("arm_impedance_command with a feed-forward wrench")
+        if 0.0 in request.diagonal_stiffness_matrix.values:
+            raise unsupported("arm_impedance_command with an axis without stiffness")
         path = arm_command_pb2.ArmCartesianCommand.Request(
             root_frame_name=request.root_frame_name, pose_trajectory_in_task=request.task_tform_desired_tool
         )

@@ -127,7 +127,17 @@ class ImageService(Service):
         """Takes the requested pictures; each has its own status."""
         made = image_pb2.GetImageResponse()
         for each in request.image_requests:
-            self._answer(made.image_responses.add(), each)
+            made.image_responses.append(self.take(each))
+        return made
+
+    def has(self, source: str) -> bool:
+        """True when there is a source of a name."""
+        return source in self._sources
+
+    def take(self, request: Any) -> Any:
+        """Takes one picture and returns the message, with its status."""
+        made = image_pb2.ImageResponse()
+        self._answer(made, request)
         return made
 
     def _take(self, source: _Source) -> Image:

@@ -11,7 +11,18 @@ from typing import Final
 
 import grpc
 
-from errand_spot.server import docking, identity, joint_control, manipulation, pictures, rays, state, streams
+from errand_spot.server import (
+    data_acquisition,
+    docking,
+    identity,
+    joint_control,
+    manipulation,
+    pictures,
+    rays,
+    state,
+    streams,
+    surface_contact,
+)
 from errand_spot.server.calls import Service, handlers
 from errand_spot.server.commands import PowerService, RobotCommandService
 from errand_spot.server.computer import Computer, Pace, Solver
@@ -27,13 +38,10 @@ from skills.robot import Clock, Pose2D, Robot
 _MOST_BYTES: Final = 64 * 1024**2
 _THREADS: Final = 24
 LISTED: Final[Mapping[str, str]] = {
-    "arm-surface-contact": "bosdyn.api.ArmSurfaceContactService",
     "auto-return": "bosdyn.api.auto_return.AutoReturnService",
     "autowalk-service": "bosdyn.api.autowalk.AutowalkService",
     "choreography": "bosdyn.api.spot.ChoreographyService",
     "data": "bosdyn.api.DataService",
-    "data-acquisition": "bosdyn.api.DataAcquisitionService",
-    "data-acquisition-store": "bosdyn.api.DataAcquisitionStoreService",
     "door": "bosdyn.api.spot.DoorService",
     "map-processing-service": "bosdyn.api.graph_nav.MapProcessingService",
     "payload-registration": "bosdyn.api.PayloadRegistrationService",
@@ -54,7 +62,7 @@ _DESCRIBED_IN: Final = (
     *("gripper_camera_param", "local_grid"),
     *("payload", "point_cloud", "power", "robot_command", "robot_id", "robot_state", "time_sync", "world_object"),
     *("docking.docking", "manipulation_api", "ray_cast", "log_status.log_status", "spot.inverse_kinematics"),
-    "keepalive.keepalive",
+    *("arm_surface_contact", "data_acquisition", "data_acquisition_store", "keepalive.keepalive"),
     "graph_nav.graph_nav",
     "mission.mission",
 )
@@ -124,7 +132,8 @@ class SpotServer:
         computer, clocks, updates = self.computer, identity.TimeSyncService(), joint_control.Updates()
         others = [(name, type_name, f"api.{DOMAIN}") for name, type_name in LISTED.items()]
         known = [(each.name, each.type, each.authority) for each in SERVICES]
-        lacking = {state.InverseKinematicsService.name} if computer.solver is None else set()
+        of_arm = {state.InverseKinematicsService.name, surface_contact.ArmSurfaceContactService.name}
+        lacking = of_arm if computer.solver is None else set()
         if computer.capabilities.lidar_height_m is None:
             lacking |= {pictures.PointCloudService.name, pictures.LocalGridService.name}
         entries = [entry for entry in (*known, *others) if entry[0] not in lacking]
@@ -138,6 +147,8 @@ class SpotServer:
         )
         gripper_camera = pictures.GripperCameraParamService()
         images = pictures.ImageService(computer, gripper_camera)
+        store, captured = data_acquisition.Store(), data_acquisition.states_of(live.states, live.objects)
+        commands = RobotCommandService(computer, leases, clocks, updates)
         made: list[Service] = [
             auth,
             identity.RobotIdService(robot_name),
@@ -149,10 +160,13 @@ class SpotServer:
             leases,
             KeepaliveService(computer),
             PowerService(computer, leases),
-            RobotCommandService(computer, leases, clocks, updates),
+            commands,
+            surface_contact.ArmSurfaceContactService(commands),
             joint_control.RobotCommandStreamingService(computer, updates),
             images,
             gripper_camera,
+            data_acquisition.DataAcquisitionService(images, captured, store),
+            data_acquisition.DataAcquisitionStoreService(store),
             rays.RayCastService(computer),
             manipulation.ManipulationService(computer, leases, options.picker, images.sizes),
             docking.DockingService(computer, leases, clocks),

@@ -29,7 +29,11 @@ _BEHIND_M: Final = 0.75
 _FOLLOWING_S: Final = 60.0
 _PER_SEGMENT: Final = 6
 _FARTHEST_M: Final = 2.0
-_FOLDED_RAD, _CLOSE_M, _GAZE_STEP_S = 0.3, 0.05, 0.25
+_FOLDED_RAD, _CLOSE_M, _GAZE_STEP_S, _GAZE_FROM_M = 0.3, 0.05, 0.25, (0.75, 0.0, 0.25)
+_GAZE_REACH_M, _GAZE_STEP_M = 0.6, 0.06
+"""Distance of a gazing hand from the shoulder, and its change in a step, while the body walks."""
+_SHOULDER_M: Final = np.array([0.292, 0.0, 0.188])
+"""Position of the shoulder in the body."""
 _STEP_M, _STEP_RAD = 0.2, 0.6
 """Largest error and turn of a step towards a pose."""
 _TRIES, _SMALL_RAD, _DAMPING, _TURN_WEIGHT, _MOST_OFF_M, _NEAR_M = 15, 1e-4, 1e-3, 0.05, 0.2, 0.02
@@ -132,19 +136,11 @@ class Cartesian(ArmMotion):
         if later:
             (a_s, X_OA), (b_s, X_OB) = self._path[later - 1 : later + 1]
             X_OW = _between(X_OA, X_OB, (ahead_s - a_s) / (b_s - a_s))
-        turned = computer.snapshot.odometry.velocity
-        X_BAhead = Pose2D(*(2.0 * _TRACK_S * value for value in turned)).transform()
-        X_OB = computer.snapshot.X_AB("odom", "body") @ X_BAhead
-        X_BW = X_OB.InvertAndCompose(X_OW)
+        X_BW = _body_ahead(computer).InvertAndCompose(X_OW)
         posture = _posture_at(computer, X_BW, q)
         if posture is None and computer.solver is not None:
             posture = _turned_posture(computer.solver, X_BW, q)
-        if posture is not None:
-            most = 2.0 * _TRACK_S * USUAL_RAD_S
-            trajectory = ArmTrajectory(
-                np.array([0.0, 2.0 * _TRACK_S]), np.array([q, q + np.clip(posture - q, -most, most)])
-            )
-            computer.robot.move_arm(trajectory, until_s=now_s + 1.0, lease=computer.lease)
+        _step_to(computer, posture, q)
 
     def tick(self, computer: Computer) -> None:
         """Goes on along the path, and reports how far the hand is from its goal."""
@@ -156,8 +152,7 @@ class Cartesian(ArmMotion):
         live = self._stays and self.status == Status.STATUS_PROCESSING
         done = getattr(self.feedback, self.field).status == self.complete
         done &= not live or (off_m < _LOST_M and off_rad < _LOST_RAD)
-        off = self._X_OB.InvertAndCompose(computer.snapshot.X_AB("odom", "body"))
-        moved = float(np.linalg.norm(off.translation())) > _MOVED_M or off.rotation().ToAngleAxis().angle() > _MOVED_RAD
+        moved = _moved(computer, self._X_OB)
         moves = computer.base_moves(shifted=moved)
         if live and moves:
             self._track(computer)
@@ -279,7 +274,7 @@ class Gaze(ArmMotion):
         given, X_OF = request.target_trajectory_in_frame1, snapshot.X_OF(request.frame1_name)
         self._targets_O = [X_OF @ np.array(vector(point.point, field)) for point in points_of(given, field)]
         self._times_s, self._tool_times_s = times_of(given, now_s, field), [0.0]
-        self._tools_O: list[FloatArray] = []
+        self._tools_O, self._misses_tool = list[FloatArray](), False
         if (tool := request.tool_trajectory_in_frame2).points:
             field = "arm_gaze_command.tool_trajectory_in_frame2"
             X_OF = snapshot.X_OF(request.frame2_name)
@@ -289,21 +284,34 @@ class Gaze(ArmMotion):
 
     def begin(self, computer: Computer) -> None:
         """Starts to turn, and follows the target; the hand is nearer or lower where it cannot look from there."""
-        X_BO, now = computer.snapshot.X_AB("body", "odom"), computer.arm_rad()
-        lasts_s = max(self._times_s[-1], self._tool_times_s[-1])
-        times_s = np.linspace(0.0, lasts_s, 1 + math.ceil(lasts_s / _GAZE_STEP_S))
-        targets_B = [X_BO @ _at(time_s, self._times_s, self._targets_O) for time_s in times_s]
-        hand_B = np.asarray(computer.snapshot.X_AB("body", "hand").translation())
-        places = [[each] * len(times_s) for each in (hand_B, np.array([0.75, 0.0, 0.25]))]
-        if self._tools_O:
-            places.insert(0, [X_BO @ _at(time_s, self._tool_times_s, self._tools_O) for time_s in times_s])
-        for at_B in places:
-            postures = [now]
-            for target_B, hand in zip(targets_B, at_B, strict=True):
-                if np.linalg.norm(away := target_B - hand) < _CLOSE_M:
-                    break
-                X_BW = RigidTransform(_looking(away), hand) @ X_HAND.inverse()
-                if (posture := _posture_at(computer, X_BW, postures[-1])) is None:
+        self._begun_s, self._tracked_s = computer.clock.now(), 0.0
+        self._hand_B = np.array(computer.snapshot.X_AB("body", "hand").translation())
+        self._plan(computer)
+
+    def tick(self, computer: Computer) -> None:
+        """Reports the state; while the body moves, the hand keeps looking at the target."""
+        if self.status == Status.STATUS_PROCESSING:
+            moved = _moved(computer, self._X_OB)
+            if computer.base_moves(shifted=moved):
+                self._track(computer)
+                self.feedback = self._made(self.going)
+                return
+            if moved or self._tracked_s:
+                self._plan(computer)
+        super().tick(computer)
+
+    def _plan(self, computer: Computer) -> None:
+        """Plans the rest of the gaze from the present poses of hand and body."""
+        self._X_OB, now, self._tracked_s = computer.snapshot.X_AB("odom", "body"), computer.arm_rad(), 0.0
+        since_s, lasts_s = computer.clock.now() - self._begun_s, max(self._times_s[-1], self._tool_times_s[-1])
+        left_s = max(lasts_s - since_s, 0.0)
+        times_s = np.linspace(0.0, left_s, 1 + math.ceil(left_s / _GAZE_STEP_S))
+        places = [self._hand_B, np.array(_GAZE_FROM_M), self._freest(since_s, self._X_OB)]
+        for place_B in [self._hand_B, *places] if self._tools_O else places:
+            self._hand_B, postures = place_B, [now]
+            for time_s in times_s:
+                posture = self._posture(computer, since_s + float(time_s), self._X_OB, postures[-1])
+                if posture is None:
                     break
                 postures.append(posture)
             if len(postures) > len(times_s):
@@ -311,13 +319,63 @@ class Gaze(ArmMotion):
                 timed = [each for each in zip(times_s.tolist(), postures[1:], strict=True) if each[0] >= first_s]
                 self._follow(computer, *zip(*(timed or [(first_s, postures[-1])]), strict=True))
                 return
-        self.feedback = self._made(self.stalled)
+            self._misses_tool, self._tools_O = self._misses_tool or bool(self._tools_O), []
+        self.command, self.feedback = None, self._made(self.stalled)
+
+    def _progress(self, computer: Computer) -> int:
+        progress = super()._progress(computer)
+        return self.stalled if self._misses_tool and progress == self.complete else progress
+
+    def _track(self, computer: Computer) -> None:
+        """Looks at the target while the body moves on."""
+        now_s, q = computer.clock.now(), computer.arm_rad()
+        if now_s >= self._tracked_s + _TRACK_S:
+            self._tracked_s, ahead_s = now_s, now_s + 2.0 * _TRACK_S - self._begun_s
+            X_OB = _body_ahead(computer)
+            self._hand_B += _at_most(self._freest(ahead_s, X_OB) - self._hand_B, _GAZE_STEP_M)
+            _step_to(computer, self._posture(computer, ahead_s, X_OB, q), q)
+
+    def _posture(self, computer: Computer, since_s: float, X_OB: RigidTransform, near: FloatArray) -> FloatArray | None:
+        """Joint angles that look at the target at a time, from the tool's path if there is one; None out of reach."""
+        X_BO, hand_B = X_OB.inverse(), self._hand_B
+        if self._tools_O:
+            hand_B = X_BO @ _at(since_s, self._tool_times_s, self._tools_O)
+        away = X_BO @ _at(since_s, self._times_s, self._targets_O) - hand_B
+        if np.linalg.norm(away) < _CLOSE_M:
+            return None
+        return _posture_at(computer, RigidTransform(_looking(away), hand_B) @ X_HAND.inverse(), near)
+
+    def _freest(self, since_s: float, X_OB: RigidTransform) -> FloatArray:
+        """Position of the hand in the body from which it can look at the target however the body turns."""
+        away = X_OB.inverse() @ _at(since_s, self._times_s, self._targets_O) - _SHOULDER_M
+        return np.asarray(_SHOULDER_M + _GAZE_REACH_M * away / max(float(np.linalg.norm(away)), _CLOSE_M))
 
     def _made(self, progress: int) -> Any:
         made, done = super()._made(progress), progress == self.complete
         part = made.arm_gaze_feedback
         part.gazing_at_target = part.hand_position_at_goal = part.hand_roll_at_goal = done
         return made
+
+
+def _moved(computer: Computer, X_OB: RigidTransform) -> bool:
+    """Returns whether the body has left a pose in `odom`."""
+    off = X_OB.InvertAndCompose(computer.snapshot.X_AB("odom", "body"))
+    return float(np.linalg.norm(off.translation())) > _MOVED_M or off.rotation().ToAngleAxis().angle() > _MOVED_RAD
+
+
+def _body_ahead(computer: Computer) -> RigidTransform:
+    """Pose of the moving body in `odom` at the end of the next step of the arm."""
+    X_BAhead = Pose2D(*(2.0 * _TRACK_S * value for value in computer.snapshot.odometry.velocity)).transform()
+    return computer.snapshot.X_AB("odom", "body") @ X_BAhead
+
+
+def _step_to(computer: Computer, posture: FloatArray | None, now: FloatArray) -> None:
+    """Moves the arm by one step towards a posture, if there is one."""
+    if posture is not None:
+        most = 2.0 * _TRACK_S * USUAL_RAD_S
+        positions = np.array([now, now + np.clip(posture - now, -most, most)])
+        trajectory = ArmTrajectory(np.array([0.0, 2.0 * _TRACK_S]), positions)
+        computer.robot.move_arm(trajectory, until_s=computer.clock.now() + 1.0, lease=computer.lease)
 
 
 def _between(X_AB: RigidTransform, X_AC: RigidTransform, share: float) -> RigidTransform:
@@ -393,8 +451,7 @@ class Moving(ArmMotion):
             R_BF = computer.snapshot.X_AB("body", self._frame).rotation()
             return np.asarray(R_BF @ np.array(self._linear))
         r, theta, z = self._linear
-        shoulder_B = np.array([0.292, 0.0, 0.188])
-        x, y, _ = X_BHand.translation() - shoulder_B
+        x, y, _ = X_BHand.translation() - _SHOULDER_M
         heading, radius = math.atan2(y, x), math.hypot(x, y)
         out, aside = np.array([math.cos(heading), math.sin(heading)]), np.array([-math.sin(heading), math.cos(heading)])
         return np.array([*(r * out + theta * radius * aside), z])

@@ -480,6 +480,38 @@ def test_a_gaze_follows_its_target(spot):
     block(spot, number)
 
 
+def gaze_error(spot, target_O):
+    away = get_a_tform_b(spot.tree, "hand", "odom").transform_point(*target_O)
+    return math.atan2(math.hypot(*away[1:]), away[0])
+
+
+def test_a_gaze_stays_on_its_target_while_the_body_walks(spot):
+    ready(spot)
+    target_O = (1.2, 1.5, 0.4)
+    gaze = Build.arm_gaze_command(*target_O, "odom")
+    block(spot, spot.commands.robot_command(gaze))
+    walk = Build.synchro_trajectory_command_in_body_frame(0.9, 0.0, 0.0, spot.tree)
+    number, off = sent(spot, Build.build_synchro_command(walk, gaze)), []
+    for _ in range(25):
+        time.sleep(0.1)
+        off.append(gaze_error(spot, target_O))
+        moves = get_a_tform_b(spot.tree, "odom", "body").x < 0.8
+        status = arm_feedback(spot, number).arm_gaze_feedback.status
+        assert not (moves and status == Gaze.STATUS_TRAJECTORY_COMPLETE)
+    assert max(off[5:]) < 0.15
+    block(spot, number)
+    assert gaze_error(spot, target_O) < 0.03
+
+
+def test_a_gaze_whose_tool_is_out_of_reach_is_stalled(spot):
+    ready(spot)
+    tool = {"frame2_tform_desired_hand": SE3Pose(2.0, 0, 0.3, Quat()), "frame2_name": "odom"}
+    command = Build.arm_gaze_command(3.0, 0.0, 0.3, "odom", **tool)
+    number = spot.commands.robot_command(command)
+    stalled = Gaze.STATUS_TOOL_TRAJECTORY_STALLED
+    assert wait_until(lambda: arm_feedback(spot, number).arm_gaze_feedback.status == stalled, 5.0)
+
+
 def test_a_body_that_follows_no_goal_stays(spot):
     block(spot, sent(spot, Build.build_synchro_command(follow(), Build.arm_ready_command())))
     assert body_x_m(spot) == pytest.approx(0.0, abs=0.01)

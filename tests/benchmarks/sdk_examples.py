@@ -30,12 +30,16 @@ WALL = Block(3.0, -1.5, 3.2, 1.5)
 def run(program, folder, python=sys.executable):
     """Runs a program of a folder; returns its exit code, None when it had to be ended, and whether it is as listed."""
     script, *arguments = program.line.split()
-    with tempfile.TemporaryDirectory() as made, scripted_spot(credentials(Path(made)), blocks=[WALL]) as (server, _):
+    with (
+        tempfile.TemporaryDirectory() as made,
+        scripted_spot(credentials(Path(made)), blocks=[WALL], downloads=True) as (server, _),
+    ):
         (empty := Path(made) / "empty").touch()
         (payload := Path(made) / "payload").write_text(f"{uuid.uuid4()}\nsecret\n")
         values = {"HOST": "127.0.0.1", "EMPTY": str(empty), "PAYLOAD": str(payload)}
         line = [python, LAUNCH, str(server.certificate), str(server.port), "real", str(folder / script)]
         user = {"BOSDYN_CLIENT_USERNAME": USER, "BOSDYN_CLIENT_PASSWORD": PASSWORD}
+        user["SPOT_HTTPS_PORT"] = str(server.downloads.port)
         limit_s = LIMIT_S if program.exit_code is not None else ENDED_S
         try:
             done = subprocess.run(

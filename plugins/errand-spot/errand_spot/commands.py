@@ -149,6 +149,7 @@ def _environment(server: SpotServer) -> dict[str, str]:
     return {
         "SPOT_IP": "127.0.0.1",
         "SPOT_PORT": str(server.port),
+        "SPOT_HTTPS_PORT": "" if server.downloads is None else str(server.downloads.port),
         "SPOT_CERTIFICATE": str(server.certificate),
         "BOSDYN_CLIENT_USERNAME": USER,
         "BOSDYN_CLIENT_PASSWORD": PASSWORD,
@@ -221,6 +222,7 @@ def _server(
         picker=PointPicker(robot, simulation.clock),
         dock_O=None if placed.dock is None else compose(inverse(placed.start), placed.dock),
         perception=SpotPerception({tag.id: tag.size_m for tag in knowledge_of(opened).known_tags()}),
+        downloads=True,
     )
     try:
         held = credentials(user_cache() / _FOLDER)

@@ -72,6 +72,14 @@ def use_server(certificate: Path, port: int) -> None:
     def reason(self: ResponseError) -> str:
         return f"{told(self)} {getattr(self.response, 'message', '')}".rstrip()
 
+    if downloads := os.environ.get("SPOT_HTTPS_PORT"):
+        from bosdyn.client import data_acquisition_helpers
+
+        def open_url(request: Any, *arguments: Any, **named: Any) -> Any:
+            request.full_url = f"https://{_ADDRESS}:{downloads}/{request.full_url.split('/', 3)[-1]}"
+            return opened(request, *arguments, **named)
+
+        opened, data_acquisition_helpers.urlopen = data_acquisition_helpers.urlopen, open_url
     told, ResponseError.__str__ = ResponseError.__str__, reason  # it names what was refused
     Sdk.load_robot_cert, channel.create_secure_channel = load_robot_cert, create_secure_channel
     AuthClient.auth, AuthClient.auth_async = logged_in(AuthClient.auth), logged_in(AuthClient.auth_async)

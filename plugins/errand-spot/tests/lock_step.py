@@ -40,10 +40,10 @@ def with_faults(robot, clock, credentials, options):
 
 
 @contextmanager
-def scripted_spot(credentials, *, tablet=Tablet.TABLET, password=PASSWORD, pace=Pace.REAL, **given):
+def scripted_spot(credentials, *, tablet=Tablet.TABLET, password=PASSWORD, pace=Pace.REAL, downloads=False, **given):
     """Serves a scripted Spot from a thread, which steps it in real time, or lets a client step it."""
     robot, clock = scripted(**given)
-    options = Options({USER: password}, tablet=tablet, pace=pace)
+    options = Options({USER: password}, tablet=tablet, pace=pace, downloads=downloads)
     server = with_faults(robot, clock, credentials, options)
     stopping = threading.Event()
     work = server.computer.run if pace is Pace.REAL else server.computer.serve

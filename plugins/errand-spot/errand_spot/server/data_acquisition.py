@@ -26,6 +26,7 @@ _Acquired = data_acquisition_pb2.AcquireDataResponse
 _Cancelled = data_acquisition_pb2.CancelAcquisitionResponse
 _MOST_BYTES: Final = 512 * 1024**2
 """Most bytes of all captures in the store."""
+_FIXED: Final = ("odom", "vision")
 _KEPT: Final = 1000
 """Acquisitions whose status is remembered."""
 
@@ -305,6 +306,7 @@ def states_of(states: RobotStateService, objects: WorldObjectService) -> Mapping
 
     return {
         "robot-state": state,
+        "basic-position-data": lambda _: {f"{frame}_tform_body": _values(states.body_in(frame)) for frame in _FIXED},
         "detailed-position-data": lambda call: {"robot_kinematics": state(call)["kinematic_state"]},
         "detected-objects": lambda _: {"world_objects": [_values(each) for each in objects.objects()]},
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from typing import Final
 
@@ -14,6 +14,7 @@ import grpc
 from errand_spot.server import (
     data_acquisition,
     docking,
+    downloads,
     identity,
     joint_control,
     manipulation,
@@ -75,7 +76,7 @@ class Options:
 
     `picker` picks up objects for the manipulation service, which otherwise refuses picks. `dock_O` is the robot's pose
     on its dock, in `odom`. Without `perception` only odometry localises the robot, and no tags are detected.
-    `interceptors` see each call.
+    `interceptors` see each call. With `downloads` a second port gives captures as files.
     """
 
     passwords: Mapping[str, str]
@@ -86,6 +87,7 @@ class Options:
     dock_O: Pose2D | None = None
     perception: Perception | None = None
     interceptors: Sequence[grpc.ServerInterceptor] = ()
+    downloads: bool = False
 
 
 class SpotServer:
@@ -104,7 +106,9 @@ class SpotServer:
         )
         self.certificate = credentials.certificate
         auth = identity.AuthService(options.passwords, credentials.token_key.read_bytes())
+        self._store = data_acquisition.Store()
         self.services = self._services(leases, estop, auth, robot.name, options)
+        self.downloads = downloads.Downloads(self._store, credentials, auth.user_of) if options.downloads else None
         self._grpc = grpc.server(
             ThreadPoolExecutor(_THREADS, thread_name_prefix="spot-api"),
             interceptors=list(options.interceptors),
@@ -147,7 +151,7 @@ class SpotServer:
         )
         gripper_camera = pictures.GripperCameraParamService()
         images = pictures.ImageService(computer, gripper_camera)
-        store, captured = data_acquisition.Store(), data_acquisition.states_of(live.states, live.objects)
+        store, captured = self._store, data_acquisition.states_of(live.states, live.objects)
         commands = RobotCommandService(computer, leases, clocks, updates)
         made: list[Service] = [
             auth,
@@ -190,6 +194,7 @@ class SpotServer:
         """
         self._grpc.start()
         try:
-            yield self
+            with self.downloads.running() if self.downloads is not None else nullcontext():
+                yield self
         finally:
             self._grpc.stop(0.5).wait()

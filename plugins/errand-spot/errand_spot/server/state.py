@@ -19,6 +19,7 @@ from errand_spot.messages import (
     api_joint,
     duration,
     frame_tree,
+    pose,
     seconds,
     timestamp,
     transform,
@@ -91,6 +92,10 @@ class RobotStateService(Service):
             return int(State.STATE_TRANSITION)
         steps = computer.feet_O is None and computer.base_moves(shifted=True)
         return int(State.STATE_STEPPING if steps else State.STATE_STANDING)
+
+    def body_in(self, frame: str) -> Any:
+        """The message of the body's pose in a frame."""
+        return pose(self._computer.snapshot.X_AB(frame, "body"))
 
     def GetRobotMetrics(self, _request: Any, _call: Call) -> Any:
         """Returns the time that the robot has been on."""

@@ -120,7 +120,9 @@ def test_an_unknown_number_does_not_exist(acquire):
 def test_the_service_names_what_can_be_captured(acquire):
     told = acquire.get_service_info()
     assert "back_fisheye_image" in told.image_sources[0].image_source_names
-    assert [each.name for each in told.data_sources] == ["robot-state", "detailed-position-data", "detected-objects"]
+    assert [each.name for each in told.data_sources] == [
+        *("robot-state", "basic-position-data", "detailed-position-data", "detected-objects")
+    ]
 
 
 def test_a_client_stores_captures_of_its_own(store):

@@ -252,7 +252,7 @@ def run(program, folder, *, seed=1, pace=Pace.REAL, python=sys.executable, impor
     The program may import from the folders `imports`.
     """
     script, *arguments = f"{folder}/{program.line}".split()
-    code, ended = [], threading.Event()
+    code, ended, pace = [], threading.Event(), Pace.REAL if program.real_time else pace
     with judged(seed, START if program.start is None else Pose2D(*program.start), pace) as judge:
         server = judge.server
         user = {"BOSDYN_CLIENT_USERNAME": "user", "BOSDYN_CLIENT_PASSWORD": "simulated"}

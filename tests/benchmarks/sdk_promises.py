@@ -42,7 +42,8 @@ class Program:
     """Program with its arguments, what it promises, its exit code, and its start (x, y, yaw) if it needs another.
 
     Its output contains `says`. In the line, HOST stands for the robot's address, EMPTY for a file without content, and
-    PAYLOAD for a file with a payload's credentials. A program without an exit code runs until it is ended.
+    PAYLOAD for a file with a payload's credentials. A program without an exit code runs until it is ended. A program
+    that waits otherwise than by sleeps of its main thread runs in `real_time` at any pace.
     """
 
     line: str
@@ -50,6 +51,7 @@ class Program:
     exit_code: int | None = 0
     start: tuple[float, float, float] | None = None
     says: str = ""
+    real_time: bool = False
 
 
 @dataclass(frozen=True)
@@ -154,6 +156,7 @@ PROGRAMS = (
     Program(
         "arm_trajectory/arm_long_cartesian_trajectory.py",
         (Promise("hand_y hand_z", ((0.25, 0), (0, 0.25), (-0.25, 0), (0, -0.25), (0.25, 0)), 0.06),),
+        real_time=True,
     ),
     Program(
         "arm_and_mobility_command/arm_and_mobility_command.py",
@@ -190,6 +193,7 @@ PROGRAMS = (
     Program(
         "joint_control/wiggle_arm.py",
         (Promise("in_body_x in_body_z", ((0.54, 0.31), (0.46, 0.17), (0.54, 0.31), (0.44, 0.49), (0.54, 0.31)), 0.06),),
+        real_time=True,
     ),
     Program(
         "docking/dock_my_robot.py --dock-id 520",

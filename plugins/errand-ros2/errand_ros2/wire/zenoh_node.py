@@ -74,14 +74,13 @@ class ZenohPublisher(Publisher):
     def __init__(self, node: ZenohNode, topic: str, kind: MessageType, qos: Qos) -> None:
         self._node, self._kind, self._numbers = node, kind, count(1)
         key, self._gid = node.key.data_key(topic, kind.key), node.declare(types.PUBLISHER, topic, kind.key, qos)
-        how: dict[str, Any] = {"encoding": _CDR, "reliability": zenoh.Reliability.RELIABLE}
-        self._publisher: Any
-        session = node.session.inner
+        priority = zenoh.Priority.DATA if qos.reliable else zenoh.Priority.DATA_LOW  # pictures wait apart, and get lost
+        how: dict[str, Any] = {"encoding": _CDR, "reliability": zenoh.Reliability.RELIABLE, "priority": priority}
+        declare: Callable[..., Any] = node.session.inner.declare_publisher
         if qos.transient_local:
-            cache = ext.CacheConfig(max_samples=qos.depth)
-            self._publisher = ext.declare_advanced_publisher(session, key, cache=cache, publisher_detection=True, **how)
-        else:
-            self._publisher = session.declare_publisher(key, **how)
+            how |= {"cache": ext.CacheConfig(max_samples=qos.depth), "publisher_detection": True}
+            declare = partial(ext.declare_advanced_publisher, node.session.inner)
+        self._publisher = declare(key, **how)
 
     @property
     def is_heard(self) -> bool:

@@ -1,6 +1,8 @@
 """Runs that share a router, senders that share a topic, and random bytes on every input of a run."""
 
 import math
+import os
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from ros_run import ACTIONS, POSE, STRING, TRIGGER, TWIST, ActionClient, run_of_
 
 from errand_ros2.wire.actions import GoalStatus
 from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import ActionType, Attachment, older_services, ros_types
 from skills.navigate.follower import FollowerOptions
 
@@ -141,6 +144,31 @@ def test_random_bytes_on_every_input_of_a_run_move_nothing(ros, capfd):
     assert ros.controls() == [] and ros.events("outcome") == []
     assert ros.call("pause").success
     ros.soon(lambda: ros.events("control"))
+    assert "Traceback" not in capfd.readouterr().err
+
+
+@pytest.mark.skipif(not (find_spec("rclpy") and find_spec("nav2_msgs")), reason="not installed: make ros")
+def test_random_bytes_from_rclpy_on_every_topic_of_a_run_move_nothing(tmp_path, capfd):
+    chance, place = np.random.default_rng(1), Place(os.getpid() % 200, by_rclpy=True)
+    topics = {f"{space}/{name}": kind for name, kind in INPUTS.items() for space in ("", "/alice")}
+    topics["/alice/say"] = STRING
+    with run_of_alice(tmp_path, place) as ros, open_session(place) as others:
+        senders = [ros.publisher(topic, kind) for topic, kind in topics.items()]
+        stamped_type = "geometry_msgs/msg/TwistStamped"
+        senders += [others.node("other").publisher(f"{space}/cmd_vel", stamped_type) for space in ("", "/alice")]
+        assert soon(lambda: all(each.is_heard for each in senders))
+        for sender in senders:
+            for number, data in enumerate(
+                chunks(chance, 48 if "cmd_vel" in sender._publisher.topic else 9000, b"\0\1\0\0")
+            ):
+                sender._publisher.publish(data)
+                if number % 10 == 0:
+                    ros.step()
+        ros.step(10)
+        assert ros.still() and (ros.robot.pose.x_m, ros.robot.pose.yaw_rad) == (0.0, 0.0)
+        assert ros.controls() == [] and ros.events("outcome") == []
+        assert ros.call("pause").success
+        ros.soon(lambda: ros.events("control"))
     assert "Traceback" not in capfd.readouterr().err
 
 

@@ -15,13 +15,14 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any, Final, Protocol, cast
 
-from errand_ros2.wire.types import USUAL, Qos, ServiceType, ros_types, topic_name
+from errand_ros2.wire.types import USUAL, MalformedError, MessageType, Qos, ServiceType, ros_types, topic_name
 from skills.inputs.errors import InputError
 
 _LOG: Final = logging.getLogger(__name__)
 _DRIFT_S, _MOST_SENDERS = 0.001, 1000  # growth of the quickest; senders noted
 _WIRE: Final = re.compile(r"(?:(rclpy|zenoh):)?(.*)", re.DOTALL)
 _PLACE: Final = re.compile(r"(?P<domain>\d{1,9})?(@(?P<host>[\w.-]+|\[[\w:.%]+\])?(:(?P<port>\d{1,5}))?)?")
+MOST_BYTES: Final = 1 << 26  # longer messages are dropped
 PORT, _MOST_DOMAIN, _MOST_PORT = 7447, 232, 65535  # port of rmw_zenoh's router; limits
 
 
@@ -135,6 +136,20 @@ class Node(ABC):
     @abstractmethod
     def client(self, name: str, kind: ServiceType) -> Client:
         """Returns a client of a service."""
+
+    def take(self, kind: MessageType, data: bytes, handle: Callable[[Any], Any], name: str) -> None:
+        """Handles a message of a topic, and counts it."""
+        if (message := self.decoded(kind, data)) is not None:
+            self.guarded(lambda: handle(message), name)
+            self.handled += 1
+
+    def decoded(self, kind: MessageType, data: bytes) -> Any:
+        """Decodes a message of just this length; counts it and returns None if it is malformed."""
+        with suppress(MalformedError):
+            if len(data) <= MOST_BYTES:
+                return kind.decode(data)
+        self.dropped += 1
+        return None
 
     def compare(self, topic: str, theirs: str) -> None:
         """Says once that a topic is published as a type which is not subscribed to."""

@@ -19,14 +19,13 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import get_rmw_implementation_identifier
 
 from errand_ros2.packages import PACKAGES
 from errand_ros2.wire.node import Client, Delays, Node, Place, Publisher, Request, Session, taken_by_others
-from errand_ros2.wire.types import USUAL, Qos, ServiceType
+from errand_ros2.wire.types import USUAL, Qos, ServiceType, ros_types
 from skills.inputs.errors import InputError
 
 _LOG: Final = logging.getLogger(__name__)
@@ -255,13 +254,7 @@ class RclpyNode(Node):
             took_s = 1e-9 * (time.time_ns() - info["source_timestamp"])
             if late_s < math.inf and delays.of(b"", took_s) > late_s:
                 return
-            try:
-                message = deserialize_message(data, kind)
-            except Exception:  # the middleware's own errors
-                self.dropped += 1
-                return
-            self.guarded(lambda: handle(message), name)
-            self.handled += 1
+            self.take(ros_types().message(type_name), data, handle, name)
 
         subscription = self.inner.create_subscription(
             kind, name, received, _profile(qos), callback_group=self.group, raw=True

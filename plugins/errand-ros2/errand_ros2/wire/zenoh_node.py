@@ -22,7 +22,6 @@ from errand_ros2.wire.types import USUAL, Attachment, MalformedError, MessageTyp
 from skills.inputs.errors import InputError
 
 _CDR: Final = "application/cdr"
-MOST_BYTES: Final = 1 << 26  # longer messages are dropped
 _CLAIM_S, _SETTLED_S = 2.0, 1.0  # wait for publishers, and until a topic's subscriptions of all types are made
 
 
@@ -175,9 +174,7 @@ class ZenohNode(Node):
         def received(sample: zenoh.Sample) -> None:
             if late_s < math.inf and _delay_s(sample, delays) > late_s:
                 return
-            if (message := self._decoded(kind, sample.payload)) is not None:
-                self.guarded(lambda: handle(message), name)
-                self.handled += 1
+            self.take(kind, sample.payload.to_bytes(), handle, name)
 
         key, session = self.key.data_key(name, kind.key), self.session.inner
         history = ext.HistoryConfig(detect_late_publishers=True, max_samples=qos.depth) if qos.transient_local else None
@@ -216,7 +213,7 @@ class ZenohNode(Node):
         def asked(query: zenoh.Query) -> None:
             try:
                 head = Attachment.decoded(query.attachment.to_bytes() if query.attachment else b"")
-                message = self._decoded(kind.request, query.payload)
+                message = self.decoded(kind.request, query.payload.to_bytes() if query.payload else b"")
             except ValueError:
                 self.dropped, message = self.dropped + 1, None
             if message is None:
@@ -229,16 +226,6 @@ class ZenohNode(Node):
     def client(self, name: str, kind: ServiceType) -> ZenohClient:
         """Returns a client of a service."""
         return ZenohClient(self, self.absolute(name), kind)
-
-    def _decoded(self, kind: MessageType, payload: zenoh.ZBytes | None) -> Any:
-        """Decodes a message; counts it and returns None if it is malformed."""
-        try:
-            if payload is None or len(payload) > MOST_BYTES:
-                raise MalformedError("no message, or one that is too long")
-            return kind.decode(payload.to_bytes())
-        except MalformedError:
-            self.dropped += 1
-            return None
 
 
 def _reply(kind: MessageType, query: zenoh.Query, key: str, asked: Attachment, response: Any) -> None:

@@ -24,7 +24,7 @@ from zenoh_ros2_sdk import ROS2ServiceClient, ROS2Subscriber
 from errand_ros2.wire.actions import ActionClient, ActionServer, GoalStatus
 from errand_ros2.wire.node import Place
 from errand_ros2.wire.session import open_session
-from errand_ros2.wire.types import LATCHED, SENSOR, ros_types
+from errand_ros2.wire.types import LATCHED, SENSOR, MalformedError, ros_types
 from skills.inputs.errors import InputError
 
 STRING, TRIGGER = "std_msgs/msg/String", "std_srvs/srv/Trigger"
@@ -253,6 +253,15 @@ def test_random_bytes_from_rclpy_are_dropped_and_counted(capfd):
         assert soon(lambda: heard and heard[-1].name == ["good"])
         assert node.dropped > 100
     assert "Traceback" not in capfd.readouterr().err
+
+
+# A header alone, with the padding that it tells: Fast CDR would read memory behind it; a velocity, shorter or longer.
+@pytest.mark.parametrize("data", [*(bytes([0, 1, 0, padding]) for padding in range(4)), b"", bytes(51), bytes(56)])
+def test_bytes_of_another_length_are_no_velocity(data):
+    twist = ros_types().message("geometry_msgs/msg/Twist")
+    assert twist.decode(bytes(52)) == twist.decode(bytes(55))
+    with pytest.raises(MalformedError):
+        twist.decode(data)
 
 
 def test_malformed_requests_get_no_answer_and_do_no_harm(router, other):

@@ -25,7 +25,7 @@ GRIPPER_ACTION: Final = "gripper_controller/gripper_cmd"
 INVALID_GOAL, PATH_VIOLATED = -1, -4
 FEEDBACK_PERIOD_S, _EPSILON_S = 0.1, 1e-6
 _EXTRA_S, MOST_S = 5.0, 120.0  # time that a trajectory may take longer, and the most that a gripper or posture takes
-_OBJECT: Final = 0.02  # share of the gripper's opening by which an object keeps it open
+_SHORT: Final = 0.03  # share of the gripper's opening, short of which it has stalled
 
 
 class PartActions:
@@ -42,7 +42,7 @@ class PartActions:
         if can.head is not None:
             self._serve(HEAD_ACTION, TRAJECTORY, partial(self._follow, can.head.joint_names, self._point_head))
         if can.gripper is not None:
-            self._thin, self._share = _OBJECT * can.gripper.widest, can.gripper.finger_joints[0][1]
+            self._short, self._share = _SHORT * can.gripper.widest, can.gripper.finger_joints[0][1]
             self._serve(GRIPPER_ACTION, GRIPPER, self._grip)
 
     @property
@@ -129,7 +129,7 @@ class PartActions:
             result = {"error_code": code, "error_string": status.reason}
         else:
             reading, wanted = self._robot.gripper(), goal.message.command.position / self._share
-            stalled = done and reading.opening - wanted > self._thin
+            stalled = done and abs(reading.opening - wanted) > self._short
             ends = {"stalled": stalled, "reached_goal": done and not stalled}
             result = {"position": self._share * reading.opening, "effort": reading.force_n, **ends}
         cancelled = goal.status is GoalStatus.CANCELING

@@ -4,6 +4,7 @@ import math
 import uuid
 from collections import defaultdict
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -362,6 +363,19 @@ def test_the_gripper_is_opened_and_tells_its_opening(ros):
     result = action.result()
     assert result.status == GoalStatus.SUCCEEDED
     assert (result.result.position, result.result.reached_goal) == (pytest.approx(-0.8, abs=0.02), True)
+
+
+@pytest.mark.parametrize("short_rad", [0.2, -0.2])
+def test_a_gripper_that_ends_short_of_its_goal_has_stalled(ros, monkeypatch, short_rad):
+    action, read = (
+        PartClient(ros, "gripper_controller/gripper_cmd", "control_msgs/action/GripperCommand"),
+        ros.robot.gripper,
+    )
+    monkeypatch.setattr(ros.robot, "gripper", lambda: replace(read(), opening=read().opening + short_rad))
+    action.goal.command.position = -0.8
+    assert action.send()
+    result = action.result().result
+    assert (result.stalled, result.reached_goal) == (True, False)
 
 
 def test_velocities_do_not_drive_the_robot_into_a_wall(ros):

@@ -189,13 +189,15 @@ def clearances(space: Space, poses: FloatArray) -> FloatArray:
 class Drive:
     """Command for one tick: body-frame velocity, remaining path (m, turns included), and distance from it (m).
 
-    `blocked_at` is the world (x, y) of the obstacle that blocks the path ahead; None when the path is clear.
+    `blocked_at` is the world (x, y) of the obstacle that blocks the path ahead; None when the path is clear. With
+    `halt`, another program moves the base in place of the velocity, until `halt` is called.
     """
 
     velocity: tuple[float, float, float]
     remaining_m: float
     off_path_m: float
     blocked_at: tuple[float, float] | None
+    halt: Callable[[], None] | None = None
 
 
 class GlobalPlanner(Protocol):

@@ -27,6 +27,7 @@ class Base:
         self._context = context
         self._command: CommandId | None = None
         self._cause = CommandCause.NONE  # of the last refusal
+        self._halt: Callable[[], None] | None = None  # halts another driver, to whom the base is left
         self._footprint = Footprint.of(context.robot.capabilities())
         self.accepted = False
         self.patience = Patience(context.clock)
@@ -37,6 +38,9 @@ class Base:
 
         Speed-limit zones reduce the velocity.
         """
+        halt, self._halt = self._halt, None
+        if halt is not None:
+            halt()
         velocity = self._within_limits(velocity)
         until_s = self._context.clock.now() + self._context.robot.capabilities().drive_expiry_s
         self._command = self._context.robot.drive(*velocity, until_s=until_s, lease=self._context.lease)
@@ -91,8 +95,17 @@ class Base:
         self.drive((0.0, 0.0, 0.0))
         return True
 
+    def leave_to(self, halt: Callable[[], None]) -> None:
+        """Leaves the base to another driver until the next command or stop, which calls `halt`."""
+        if self._halt != halt:
+            self.stop()
+            self._halt = halt
+        self.last_velocity = np.array(self._context.robot.odometry().velocity)
+
     def stop(self) -> None:
-        """Stops the last command if it still runs, and no other motion."""
+        """Stops the last command if it still runs, and another driver, but no other motion."""
+        if self._halt is not None:
+            self.drive((0.0, 0.0, 0.0))
         self.last_velocity = np.zeros(3)
         if self._command is None:
             return

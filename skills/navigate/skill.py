@@ -322,7 +322,7 @@ class Navigate(RoutineSkill[NavigateInputs]):
         pose, velocity = self.context.pose(), self.context.robot.odometry().velocity
         costmap, most_m_s = self._around.costmap(pose, goal), min(most_m_s, pace.most_m_s)
         answer = follower.command(pose, velocity, self._base.last_velocity, costmap, most_m_s)
-        self._base.drive(answer.velocity)
+        self._base.drive(answer.velocity) if answer.halt is None else self._base.leave_to(answer.halt)
         if waits is not None or not pace.waiting or pace.person is None:
             return answer, waits
         place_W = pace.person.place_W

@@ -1,28 +1,72 @@
-"""Planner that asks the robot's own Nav2 for a path, in place of ours."""
+"""Planner and controller that leave paths, and whole drives, to the robot's own Nav2."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import math
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Final
 
 import numpy as np
 
-from errand_ros2.messages import MAP_FRAME, pose_stamped
+from errand_ros2.messages import MAP_FRAME, Fields, pose_stamped
 from errand_ros2.readings import planar_pose
-from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError
-from errand_ros2.wire.node import Place
+from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError, SentGoal
+from errand_ros2.wire.node import Place, Session
 from errand_ros2.wire.session import open_session
-from skills.api import FreeSpace, PlanningError
+from errand_ros2.wire.types import ros_types
+from skills.api import Cause, FreeSpace, PlanningError
 from skills.footprint import Footprint, footprint_clearance_m, pose_array
 from skills.geometry import compose, inverse
 from skills.inputs.errors import InputError
-from skills.path import Path, densify
+from skills.navigate.follower import FollowerOptions, PathFollower
+from skills.path import Drive, Path, densify, progress_m
 from skills.quantities import Angle, Coordinate, Duration, Length
-from skills.robot import Pose2D
+from skills.robot import BaseKind, FloatArray, Pose2D
+from skills.routine import SkillFailure
 
-_ACTION: Final = "nav2_msgs/action/ComputePathToPose"
+_PLAN: Final = "nav2_msgs/action/ComputePathToPose"
+_TO_POSE, _THROUGH = (f"nav2_msgs/action/{each}" for each in ("NavigateToPose", "NavigateThroughPoses"))
+_STEP_M: Final = 0.05
+_ERRORS: Final = (
+    (Cause.PRECONDITION, "one of its servers does not take the request", (1, 2)),
+    (
+        Cause.PRECONDITION,
+        "it lacks the controller, planner, smoother or graph asked for",
+        (101, 201, 301, 402, 407, 501),
+    ),
+    (Cause.PRECONDITION, "it cannot load its behaviour tree", (9001, 9101)),
+    (Cause.PRECONDITION, "the robot stands outside of its map", (203, 303)),
+    (Cause.PLANNING, "the robot stands in an obstacle", (205, 305)),
+    (Cause.PLANNING, "the goal is outside of its map", (204, 304)),
+    (Cause.PLANNING, "the goal lies in an obstacle", (206, 306)),
+    (Cause.PLANNING, "no path leads to the goal", (208, 308, 403, 405)),
+    (Cause.PLANNING, "the planner timed out", (207, 307, 404)),
+    (Cause.PLANNING, "the smoother timed out", (502,)),
+    (Cause.PLANNING, "the path cannot be used", (103, 309, 503, 504, 505, 713, 724)),
+    (Cause.EXECUTION, "the way is blocked", (104, 106, 703, 714, 723)),
+    (Cause.EXECUTION, "the robot makes no progress", (105,)),
+    (Cause.EXECUTION, "the controller timed out", (107, 108)),
+    (Cause.EXECUTION, "a recovery timed out", (701, 711, 721, 731, 741)),
+    (Cause.EXECUTION, "it timed out", (9003, 9103)),
+    (Cause.EXECUTION, "it lacks transforms from map to robot", (102, 202, 302, 401, 702, 712, 722, 732, 9002, 9102)),
+)
+"""Causes and words of the error codes in Nav2's results, of Jazzy to Lyrical; Humble has none."""
+_MEANINGS: Final = {code: (cause, words) for cause, words, codes in _ERRORS for code in codes}
+
+
+def failure_of(result: Any) -> tuple[Cause, str]:
+    """Returns the cause of a failure, and its words, by the error code and the message of a result."""
+    code, said = getattr(result, "error_code", 0), getattr(result, "error_msg", "")
+    cause, words = _MEANINGS.get(code, (Cause.EXECUTION, "it does not say why" if not said else ""))
+    return cause, ", ".join(filter(None, [words, f"error {code}" if code else "", f"'{said[:200]}'" if said else ""]))
+
+
+def _in_map(map_pose: Sequence[float], pose: Pose2D) -> Fields:
+    """Message of a pose in the robot's frame `map`."""
+    return pose_stamped(0.0, MAP_FRAME, compose(inverse(Pose2D(*map_pose)), pose).transform())
 
 
 @dataclass(frozen=True)
@@ -49,12 +93,10 @@ class Nav2:
         return partial(self._plan, costmap, footprint, start, goal)
 
     def _plan(self, costmap: FreeSpace, footprint: Footprint, start: Pose2D, goal: Pose2D) -> Path:
-        X_WM = Pose2D(*self.map_pose)
-        poses_M = [compose(inverse(X_WM), pose).transform() for pose in (start, goal)]
-        here, there = (pose_stamped(0.0, MAP_FRAME, X_MB) for X_MB in poses_M)
+        X_WM, here, there = Pose2D(*self.map_pose), *(_in_map(self.map_pose, pose) for pose in (start, goal))
         asked = {"start": here, "goal": there, "use_start": True, "planner_id": self.planner_id}
         with open_session(Place.parse(self.network)) as session:
-            client = ActionClient(session.node("errand_planner"), self.action, _ACTION)
+            client = ActionClient(session.node("errand_planner"), self.action, _PLAN)
             try:
                 sent = client.send(asked, limit_s=self.limit_s)
             except NoAnswerError as error:
@@ -63,8 +105,7 @@ class Nav2:
                 raise PlanningError(f"Nav2 on {self.action} does not plan within {self.limit_s:g} s")
         result = sent.result
         if sent.status is not GoalStatus.SUCCEEDED:
-            why, code = (getattr(result, each, "") for each in ("error_msg", "error_code"))  # which Humble lacks
-            raise PlanningError(f"Nav2 finds no path: {why[:200] or code}")
+            raise PlanningError(f"Nav2 finds no path: {failure_of(result)[1]}")
         try:
             found = [compose(X_WM, planar_pose(each.pose)) for each in result.path.poses]
         except InputError as error:
@@ -74,5 +115,148 @@ class Nav2:
             raise PlanningError(f"Nav2's path ends {off_m:.2f} m from the goal")
         rows = pose_array([start, *found, goal])
         rows[:, 2] = np.unwrap(rows[:, 2])
-        poses = densify(rows, 0.05)
+        poses = densify(rows, _STEP_M)
         return Path(poses, footprint_clearance_m(costmap, footprint, poses))
+
+
+@dataclass(frozen=True)
+class Nav2Drive(FollowerOptions):
+    """Whole drives by the robot's own Nav2: its action `navigate_to_pose` gets the goal of each path.
+
+    With `through_m`, poses of the path so far apart (m) go to its action `navigate_through_poses`. `action` is the
+    action's absolute name, `behavior_tree` that of Nav2's file; `network` and `map_pose` as for the planner `nav2`.
+    Nav2 must accept a goal within `limit_s` (of the wall clock), and send feedback each `silent_s` (of the robot's).
+    Within `near_m` of the goal Errand drives by the options of `path_follower`: Nav2 stops less exactly.
+    """
+
+    action: str = "/navigate_to_pose"
+    through_m: Length = 0.0
+    behavior_tree: str = ""
+    network: str = ""
+    map_pose: tuple[Coordinate, Coordinate, Angle] = (0.0, 0.0, 0.0)
+    limit_s: Duration = 5.0
+    silent_s: Duration = 5.0
+    near_m: Length = 0.5
+
+    def build(self, path: Path, footprint: Footprint, *, max_speed_m_s: float) -> PathFollower:
+        """Creates what drives along one path: Nav2, or Errand itself along a short one."""
+        own = super().build(path, footprint, max_speed_m_s=max_speed_m_s)
+        is_near = math.hypot(*(path.poses[-1] - path.poses[0])[:2]) <= self.near_m
+        return own if is_near else Nav2Follower(path, footprint, self)
+
+
+class _Trip:
+    """Goal of Nav2, sent and cancelled by a thread of its own, since a tick waits for nobody.
+
+    `left_m` is the distance by the last of `heard` feedback messages. Set `over` to cancel the goal, or once it ended.
+    """
+
+    def __init__(self, options: Nav2Drive, poses: Sequence[Fields]) -> None:
+        self.left_m, self.heard, self.over = 0.0, 0, threading.Event()
+        self.sent: SentGoal | None = None
+        self.failure: SkillFailure | None = None
+        threading.Thread(target=self._pursue, args=(options, poses), daemon=True).start()
+
+    def _pursue(self, options: Nav2Drive, poses: Sequence[Fields]) -> None:
+        told = ""
+        try:
+            with open_session(Place.parse(options.network)) as session:
+                told = f" ({session.told})"
+                self._send(session, options, poses)
+        except NoAnswerError:
+            what = f"No Nav2 has accepted the goal on {options.action} within {options.limit_s:g} s{told}."
+            self.failure = SkillFailure(Cause.PRECONDITION, what, final=True)
+        except InputError as error:
+            self.failure = SkillFailure(Cause.PRECONDITION, f"No drive by Nav2: {error}", final=True)
+
+    def _send(self, session: Session, options: Nav2Drive, poses: Sequence[Fields]) -> None:
+        """Sends the goal, and cancels it when the trip is over before the goal has ended."""
+        node, kind = session.node("errand_drive"), _THROUGH if options.through_m else _TO_POSE
+        node.subscribe(f"{options.action}/_action/feedback", f"{kind}_FeedbackMessage", self._hear)
+        client, tree = ActionClient(node, options.action, kind), {"behavior_tree": options.behavior_tree}
+        goals = ros_types().make("nav_msgs/msg/Goals", goals=poses)
+        try:
+            goal = {"poses": goals} if options.through_m else {"pose": poses[-1]}
+            sent = client.send(goal | tree, limit_s=options.limit_s)
+        except TypeError:  # before Kilted, poses are a list
+            sent = client.send({"poses": poses} | tree, limit_s=options.limit_s)
+        if sent is None:
+            self.failure = SkillFailure(Cause.PLANNING, f"Nav2 rejects the goal on {options.action}.")
+            return
+        self.sent = sent
+        self.over.wait()
+        if not sent.ended.is_set():
+            client.cancel(sent)
+            sent.ended.wait(options.limit_s)
+
+    def _hear(self, message: Any) -> None:
+        if self.sent is not None and bytes(message.goal_id.uuid) == bytes(self.sent.identity["uuid"]):
+            self.left_m, self.heard = float(message.feedback.distance_remaining), self.heard + 1
+
+
+class Nav2Follower(PathFollower):
+    """Leaves a path to Nav2; drives the last part itself, where Nav2 says that it has arrived."""
+
+    def __init__(self, path: Path, footprint: Footprint, options: Nav2Drive) -> None:
+        super().__init__(path, footprint, options)
+        self._by, self._goal, self._arrived = options, path.goal, False
+        step_m = options.through_m or math.inf
+        along = step_m * np.arange(1.0, self.length_m / step_m)
+        rows = [*path.poses[np.searchsorted(progress_m(path.poses), along)], path.poses[-1]]
+        self._poses = [_in_map(options.map_pose, Pose2D(*row.tolist())) for row in rows]
+        self._trip: _Trip | None = None
+        self._heard, self._silent_s = 0, 0.0
+
+    def command(
+        self,
+        pose: Pose2D,
+        velocity: tuple[float, float, float],
+        last: FloatArray,
+        costmap: FreeSpace,
+        most_m_s: float = math.inf,
+    ) -> Drive:
+        """Sends Nav2 its goal, and again after a halt; at a speed of 0 the robot stands. Raises SkillFailure."""
+        own = super().command(pose, velocity, last, costmap, most_m_s)
+        if self._arrived:
+            return own
+        stands = Drive((0.0, 0.0, 0.0), own.remaining_m, 0.0, None)
+        if most_m_s <= 0.0:
+            return stands
+        self._trip = trip = self._trip or _Trip(self._by, self._poses)
+        if trip.failure is not None:
+            raise trip.failure
+        if trip.sent is not None and trip.sent.ended.is_set():
+            self.halt()
+            self._end(trip.sent, pose, costmap)
+            return stands
+        is_silent = trip.sent is not None and trip.heard == self._heard
+        self._heard, self._silent_s = trip.heard, self._silent_s + self._by.period_s if is_silent else 0.0
+        if self._silent_s > self._by.silent_s:
+            what = f"Nav2 on {self._by.action} has sent neither feedback nor a result for {self._by.silent_s:g} s."
+            raise SkillFailure(Cause.EXECUTION, what)
+        return replace(stands, remaining_m=trip.left_m or own.remaining_m, halt=self.halt)
+
+    def halt(self) -> None:
+        """Lets Nav2 cancel its goal, if it has one."""
+        if self._trip is not None:
+            self._trip.over.set()
+        self._trip, self._silent_s = None, 0.0
+
+    def _end(self, sent: SentGoal, pose: Pose2D, costmap: FreeSpace) -> None:
+        """Judges how Nav2's goal ended, by the robot's pose; plans the last part. Raises SkillFailure."""
+        if sent.status is GoalStatus.CANCELED:
+            raise SkillFailure(Cause.EXECUTION, "Another program has cancelled Nav2's goal.")
+        if sent.status is not GoalStatus.SUCCEEDED:
+            cause, words = failure_of(sent.result)
+            raise SkillFailure(cause, f"Nav2 gave up: {words}.", final=cause is Cause.PRECONDITION)
+        rows, off_m = pose_array([pose, self._goal]), math.hypot(self._goal.x_m - pose.x_m, self._goal.y_m - pose.y_m)
+        if off_m > self._by.near_m:
+            raise SkillFailure(Cause.POSTCONDITION, f"Nav2 says it is there, and the robot is {off_m:.2f} m off.")
+        if self._footprint.base_kind is BaseKind.DIFFERENTIAL and off_m > _STEP_M:
+            heading = math.atan2(*(rows[1] - rows[0])[1::-1])
+            rows = np.insert(rows, 1, [[*rows[0, :2], heading], [*rows[1, :2], heading]], axis=0)
+        rows[:, 2] = np.unwrap(rows[:, 2])
+        poses = densify(rows, _STEP_M)
+        rest = Path(poses, footprint_clearance_m(costmap, self._footprint, poses))
+        super().__init__(rest, self._footprint, self._by)
+        self._arrived = True

@@ -1,0 +1,83 @@
+"""A Nav2 whose behaviour a test scripts: it takes goals of whole drives, and drives straight to them."""
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+
+from errand_ros2 import messages
+from errand_ros2.readings import planar_pose
+from errand_ros2.wire.actions import ActionServer, GoalStatus
+from skills.geometry import wrap
+
+TO_POSE, THROUGH = "navigate_to_pose", "navigate_through_poses"
+KINDS = {TO_POSE: "nav2_msgs/action/NavigateToPose", THROUGH: "nav2_msgs/action/NavigateThroughPoses"}
+SPEED_M_S, TURN_RAD_S, NEAR_M, NEAR_RAD = 0.5, 1.0, 0.25, 0.25
+"""Speeds, and the tolerances within which Nav2 by default counts a goal as reached."""
+
+
+class ScriptedNav2:
+    """Serves one action below a namespace. The test calls `step` at each tick with the pose of the base on Nav2's map.
+
+    `rejects`, `dies` after acceptance (neither feedback nor result), aborts with the code `fails` and its `says`,
+    `lies` that it has arrived. `poses` are those of the last goal; `told` counts feedback messages, `cancelled` goals.
+    """
+
+    def __init__(self, session, action=TO_POSE, space="/alice"):
+        self.rejects, self.dies, self.fails, self.says, self.lies = False, False, 0, "", False
+        self.goals, self.poses, self.told, self.cancelled = [], [], 0, 0
+        self._goal, self._left, self._pool = None, [], ThreadPoolExecutor(2)
+        self.name, node = f"{space}/{action}", session.node("bt_navigator", space)
+        self._server = ActionServer(
+            node, action, KINDS[action], accept=self._accept, cancel=self._cancel, pool=self._pool
+        )
+
+    def _accept(self, goal):
+        if self.rejects:
+            return False
+        message = goal.message
+        stamped = [message.pose] if hasattr(message, "pose") else message.poses.goals
+        self.poses = [planar_pose(each.pose) for each in stamped]
+        self._left = [*self.poses]
+        self._goal = goal
+        self.goals.append(goal)
+        return True
+
+    def _cancel(self, goal):
+        self.cancelled += 1
+        self._goal = None
+        self._server.end(goal, GoalStatus.CANCELED)
+
+    def cancel(self):
+        """Cancels the goal as another program does."""
+        self._cancel(self._goal)
+
+    @property
+    def drives(self):
+        return self._goal is not None
+
+    def step(self, pose):
+        """Returns the velocity (vx, wz) of the base; gives feedback, or ends the goal."""
+        if self._goal is None or self.dies:
+            return 0.0, 0.0
+        if self.fails or self.lies:
+            goal, self._goal = self._goal, None
+            status = GoalStatus.SUCCEEDED if self.lies else GoalStatus.ABORTED
+            self._server.end(goal, status, error_code=self.fails, error_msg=self.says)
+            return 0.0, 0.0
+        to = self._left[0]
+        off_m = math.hypot(to.x_m - pose.x_m, to.y_m - pose.y_m)
+        turn = wrap((to.yaw_rad if off_m < NEAR_M else math.atan2(to.y_m - pose.y_m, to.x_m - pose.x_m)) - pose.yaw_rad)
+        if off_m < NEAR_M and (len(self._left) > 1 or abs(turn) < NEAR_RAD):
+            self._left.pop(0)
+        if not self._left:
+            goal, self._goal = self._goal, None
+            self._server.end(goal, GoalStatus.SUCCEEDED)
+            return 0.0, 0.0
+        self.told += 1
+        more = {"number_of_poses_remaining": len(self._left)} if len(self.poses) > 1 else {}
+        here = messages.pose_stamped(0.0, "map", pose.transform())
+        self._server.tell(self._goal, current_pose=here, distance_remaining=off_m, **more)
+        wz = max(-TURN_RAD_S, min(TURN_RAD_S, 2.0 * turn))
+        return (SPEED_M_S if off_m >= NEAR_M and abs(turn) < 0.3 else 0.0), wz
+
+    def close(self):
+        self._pool.shutdown()

@@ -107,11 +107,9 @@ class Base:
         if self._halt is not None:
             self.drive((0.0, 0.0, 0.0))
         self.last_velocity = np.zeros(3)
-        if self._command is None:
-            return
-        if self._context.robot.command_status(self._command).state is CommandState.RUNNING:
-            self._context.robot.stop(lease=self._context.lease, only=self._command)
-        self._command = None
+        robot, command, self._command = self._context.robot, self._command, None
+        if command is not None and robot.command_status(command).state is CommandState.RUNNING:
+            robot.stop(lease=self._context.lease, only=command)
 
 
 def _moved(vx: float, vy: float, wz: float, time_s: float) -> Pose2D:

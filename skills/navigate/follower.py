@@ -98,10 +98,8 @@ class PathFollower:
         by_clearance = float(speed_by_clearance(now_m, self._options))
         speed = min(float(self._limits[self._index]), in_time, by_clearance, most_m_s)
         wanted = self._wanted(here, along, speed) if free_m > 0.0 and most_m_s > 0.0 else np.zeros(3)
-        limited = self._slew(self._clip(wanted), last)
-        safe = self._brake(limited, here, costmap)
-        remaining = self.length_m - along
-        return Drive((float(safe[0]), float(safe[1]), float(safe[2])), remaining, off_path_m, blocked_at)
+        vx, vy, wz = self._brake(self._slew(self._clip(wanted), last), here, costmap).tolist()
+        return Drive((vx, vy, wz), self.length_m - along, off_path_m, blocked_at)
 
     def _project(self, here: FloatArray) -> float:
         """Moves the index to the nearest pose on a short stretch of the path; returns the distance to that pose (m)."""

@@ -95,13 +95,12 @@ class GivingWay:
         """Reserves the rest of the path."""
         self._traffic.announce(follower.ahead(math.inf), footprint.discs)
 
-    def reserve_pose(self, pose: Pose2D, footprint: Footprint) -> None:
-        """Reserves only the pose where the robot stands."""
-        self._traffic.announce(pose_array([pose]), footprint.discs)
+    def reserve_poses(self, footprint: Footprint, *poses: Pose2D) -> None:
+        """Reserves only the pose where the robot stands, and the goal while no path leads to it.
 
-    def reserve_goal(self, pose: Pose2D, goal: Pose2D, footprint: Footprint) -> None:
-        """Reserves the goal while no path leads to it, so that a robot with lower priority steps aside."""
-        self._traffic.announce(pose_array([pose, goal]), footprint.discs)
+        Then a robot with lower priority steps aside.
+        """
+        self._traffic.announce(pose_array(poses), footprint.discs)
 
     def others(self) -> Sequence[Neighbour]:
         """All other robots that have reported recently."""
@@ -150,9 +149,7 @@ class GivingWay:
         Swaps priorities with a robot that takes longer than `patience_s`.
         """
         ahead = follower.ahead(self._options.room_look_m)
-        for one in self._traffic.others():
-            if not one.yields:
-                continue
+        for one in (one for one in self._traffic.others() if one.yields):
             body = with_outlines(NoObstacles(), [(one.discs, one.pose[None, :])])
             clearance = footprint_clearance_m(body, footprint, ahead)
             if clearance.min() < min(self._options.room_m, float(clearance[0]) - 0.02):
@@ -176,10 +173,8 @@ class GivingWay:
 
     def name_at(self, place_W: tuple[float, float] | None) -> str | None:
         """Name of the robot near a point (x, y); None when no robot is near the point."""
-        if place_W is None:
-            return None
-        about = (one.name for one in self._traffic.others() if math.dist(place_W, one.pose[:2].tolist()) < _ABOUT_M)
-        return next(about, None)
+        about = (one for one in self.others() if place_W and math.dist(place_W, one.pose[:2].tolist()) < _ABOUT_M)
+        return next((one.name for one in about), None)
 
     def blocked_robots(self, here: Pose2D, footprint: Footprint) -> Sequence[str]:
         """Names of the robots whose reserved path this robot blocks."""

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from skills.api import Cause, Failed, Part, PlanningError, Running, SkillContext, Step, Succeeded
+from skills.api import Cause, Failed, Part, PlanningError, Running, Skill, SkillContext, Step, Succeeded
 from skills.footprint import Footprint, footprint_clearance_m
 from skills.geometry import relative_pose
 from skills.navigate.arm_footprint import ArmFootprint
@@ -116,13 +116,8 @@ class Navigate(RoutineSkill[NavigateInputs]):
         self._planning.retarget(inputs, self._pose_then() if self._drives else None)
         return True
 
-    def suspend(self) -> None:
-        """Ends the attempt, so that other robots may pass in the meantime."""
-        self.end()
-
-    def resume(self, inputs: NavigateInputs) -> None:
-        """Starts a new attempt from the present pose."""
-        self.begin(inputs)
+    suspend, resume = Skill.suspend, Skill.resume
+    """A pause ends the attempt, so that other robots may pass; afterwards a new one begins from the present pose."""
 
     def undone(self, inputs: NavigateInputs) -> str | None:
         """Checks that the robot is within 1 m of the goal; later skills may have moved it a little."""
@@ -270,7 +265,7 @@ class Navigate(RoutineSkill[NavigateInputs]):
         """Stands at a waiting pose until no other robot passes any more, then plans to the goal again."""
         robots = self._around.robots
         while True:
-            robots.reserve_pose(self.context.pose(), self._around.footprint)
+            robots.reserve_poses(self._around.footprint, self.context.pose())
             self._progress.best_s = self._now()
             if not robots.robots_with_priority() or self._now() >= self._planning.wait_until_s:
                 break

@@ -374,7 +374,7 @@ class TripPlanning:
         if not self._robots.may_go(self._now(), self._options.giving_way.blocked_patience_s):
             return False
         self.obstacle_W = self.obstacle_W or (self.goal.x_m, self.goal.y_m)
-        self._around.robots.reserve_goal(self._context.pose(), self.goal, self._around.footprint)
+        self._around.robots.reserve_poses(self._around.footprint, self._context.pose(), self.goal)
         self._around.clear_obstacles()
         return True
 

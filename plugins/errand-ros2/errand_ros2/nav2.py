@@ -23,7 +23,7 @@ from skills.geometry import compose, inverse
 from skills.inputs.errors import InputError
 from skills.navigate.follower import FollowerOptions, PathFollower
 from skills.path import Drive, Path, densify, progress_m
-from skills.quantities import Angle, Coordinate, Duration, Length
+from skills.quantities import Angle, Coordinate, Duration, Length, Margin
 from skills.robot import BaseKind, FloatArray, Pose2D
 from skills.routine import SkillFailure
 
@@ -34,7 +34,7 @@ _ERRORS: Final = (
     (Cause.PRECONDITION, "one of its servers does not take the request", (1, 2)),
     (
         Cause.PRECONDITION,
-        "it lacks the controller, planner, smoother or graph asked for",
+        "it lacks the planner, controller or graph asked for",
         (101, 201, 301, 402, 407, 501),
     ),
     (Cause.PRECONDITION, "it cannot load its behaviour tree", (9001, 9101)),
@@ -130,7 +130,7 @@ class Nav2Drive(FollowerOptions):
     """
 
     action: str = "/navigate_to_pose"
-    through_m: Length = 0.0
+    through_m: Margin = 0.0
     behavior_tree: str = ""
     network: str = ""
     map_pose: tuple[Coordinate, Coordinate, Angle] = (0.0, 0.0, 0.0)
@@ -205,7 +205,7 @@ class Nav2Follower(PathFollower):
         rows = [*path.poses[np.searchsorted(progress_m(path.poses), along)], path.poses[-1]]
         self._poses = [_in_map(options.map_pose, Pose2D(*row.tolist())) for row in rows]
         self._trip: _Trip | None = None
-        self._heard, self._silent_s = 0, 0.0
+        self._heard, self._silent_s, self._left_m = 0, 0.0, 0.0
 
     def command(
         self,
@@ -234,7 +234,8 @@ class Nav2Follower(PathFollower):
         if self._silent_s > self._by.silent_s:
             what = f"Nav2 on {self._by.action} has sent neither feedback nor a result for {self._by.silent_s:g} s."
             raise SkillFailure(Cause.EXECUTION, what)
-        return replace(stands, remaining_m=trip.left_m or own.remaining_m, halt=self.halt)
+        self._left_m = trip.left_m or self._left_m or own.remaining_m
+        return replace(stands, remaining_m=self._left_m, halt=self.halt)
 
     def halt(self) -> None:
         """Lets Nav2 cancel its goal, if it has one."""

@@ -2,15 +2,27 @@
 
 import math
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import yaml
+from ros_client import free_port, soon
+from ros_lock_step import LockStep
 
 from errand_ros2 import messages
 from errand_ros2.readings import planar_pose
+from errand_ros2.server import PERIOD_S
 from errand_ros2.wire.actions import ActionServer, GoalStatus
-from skills.geometry import wrap
+from errand_ros2.wire.node import Place
+from executive.app.prepare.from_request import prepare
+from executive.run.control import Control
+from executive.run.visitor import RunVisitor
+from skills.geometry import compose, wrap
+from tests.benchmarks.served_missions import run_served
 
 TO_POSE, THROUGH = "navigate_to_pose", "navigate_through_poses"
 KINDS = {TO_POSE: "nav2_msgs/action/NavigateToPose", THROUGH: "nav2_msgs/action/NavigateThroughPoses"}
 SPEED_M_S, TURN_RAD_S, NEAR_M, NEAR_RAD = 0.5, 1.0, 0.25, 0.25
+FAST_M_S, STILL_M_S, PAUSED_TICKS = 0.4, 0.05, 40
 """Speeds, and the tolerances within which Nav2 by default counts a goal as reached."""
 
 
@@ -81,3 +93,53 @@ class ScriptedNav2:
 
     def close(self):
         self._pool.shutdown()
+
+
+class DrivenByNav2(RunVisitor):
+    """Moves a served robot by `cmd_vel` while Nav2 has a goal, and pauses it so often for two seconds while it is fast.
+
+    Nav2 localises the robot by odometry from `start`. `stands_after_s` are times from a pause until the base stands.
+    """
+
+    def __init__(self, step, nav2, start, control, pauses):
+        self.step, self.nav2, self.start, self._control, self._pauses = step, nav2, start, control, pauses
+        self._velocity = step.node.publisher("/alice/cmd_vel", "geometry_msgs/msg/Twist")
+        self.driven, self.stands_after_s, self._ticks = 0, [], None
+
+    def tick(self, progress):
+        if self._ticks == 0:
+            assert soon(lambda: not self.nav2.drives)  # which takes milliseconds: no step of a robot's clock
+        odometry = self.step.served.odometry()
+        if self.nav2.drives:
+            self.driven += 1
+            vx, wz = self.nav2.step(compose(self.start, odometry.pose))
+            self._velocity.put(messages.twist((vx, 0.0, wz)))
+        speed = math.hypot(*odometry.velocity[:2])
+        if self._ticks is None and speed > FAST_M_S and len(self.stands_after_s) < self._pauses:
+            self._ticks = -1
+            self.stands_after_s.append(math.inf)
+            self._control.pause(robot="Alice")
+        elif self._ticks is not None:
+            self._ticks += 1
+            if speed >= STILL_M_S:
+                self.stands_after_s[-1] = math.inf
+            elif self.stands_after_s[-1] == math.inf:
+                self.stands_after_s[-1] = round(self._ticks * PERIOD_S, 3)
+            if self._ticks == PAUSED_TICKS:
+                self._ticks = None
+                self._control.resume(robot="Alice")
+
+
+def by_nav2(request, out, action, through_m=0.0, pauses=0, pace=None):
+    """Runs a request whose drives go by a scripted Nav2; returns how it ended, and what moved the robot."""
+    place, made = Place(port=free_port()), []
+    options = {"use": "nav2", "action": f"/alice/{action}", "through_m": through_m, "network": f"zenoh:@:{place.port}"}
+    (stack := out / "nav2.yaml").write_text(yaml.safe_dump({"controller": options}))
+    request, control = replace(request, stack=stack, record=False, out=out / "out"), Control(pace=pace)
+    start = prepare(request).world.start
+
+    def driven(step):
+        made.append(DrivenByNav2(step, ScriptedNav2(step.node.session, action), start, control, pauses))
+        return {"visitors": made, "control": control}
+
+    return run_served(request, lambda build: LockStep(build, place), driven), made[0]

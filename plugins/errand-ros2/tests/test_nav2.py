@@ -79,7 +79,7 @@ def test_nav2_plans_on_its_own_map():
         ([], {}, "ends inf m from the goal"),
         ([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], {}, "ends 1.00 m from the goal"),
         ([(np.nan, 0.0, 0.0)], {}, "not finite"),
-        ([], {"error": "the goal is occupied"}, "Nav2 finds no path: the goal is occupied"),
+        ([], {"error": "the goal is occupied"}, "no path leads to the goal, error 208, 'the goal is occupied'"),
         ([], {"answers": False}, "does not plan within 0.5 s"),
     ],
 )

@@ -11,6 +11,7 @@ pytest.importorskip("zenoh", reason="not installed: pip install eclipse-zenoh")
 from ros2_benchmarks import in_flat
 from ros2_missions import through_ros
 from ros_run import PATIENCE_S, STRING, ActionClient, PartClient, RosClient, SteppedBridge
+from scripted_nav2 import THROUGH, TO_POSE, by_nav2
 
 from errand_ros2.part_actions import GRIPPER, TRAJECTORY
 from errand_ros2.wire.actions import GoalStatus
@@ -53,6 +54,23 @@ def test_a_run_whose_robot_is_silent_for_a_while_goes_on_by_itself(tmp_path):
     seen = [(mode.value, reason) for mode, reason in cuts[0].seen]
     assert seen == [("running", ""), ("paused", "Alice has not answered for 3 s"), ("running", "")]
     assert (ended.outcome, ended.verdict) == ("success", True), ended
+
+
+@pytest.mark.mission
+def test_a_mission_drives_by_nav2_stands_at_once_when_paused_and_goes_on(tmp_path):
+    request = Request(file=MISSIONS / "go_to_pose.yaml", given={"x": 8.6, "y": 4.5, "yaw": 1.57}, seed=3)
+    ended, driven = by_nav2(request, tmp_path, TO_POSE, pauses=1)
+    assert (ended.outcome, ended.verdict) == ("success", True), ended
+    assert max(driven.stands_after_s) <= 0.2  # on the robot's clock
+    assert (len(driven.nav2.goals), driven.nav2.cancelled) == (2, 1)
+
+
+@pytest.mark.mission
+@pytest.mark.nightly
+def test_drives_of_a_fetch_go_by_nav2_through_the_poses_of_errands_path(tmp_path):
+    ended, driven = by_nav2(Request(file=MISSIONS / "fetch_drink.yaml", seed=1), tmp_path, THROUGH, 1.0)
+    assert (ended.outcome, ended.verdict) == ("success", True), ended
+    assert driven.driven > 200
 
 
 def talked_to(says):

@@ -126,7 +126,7 @@ def test_a_goal_without_a_path_can_be_reserved():
     alice, bob = giving_way(table, "alice"), giving_way(table, "bob")
     alice.begin()
     bob.begin()
-    alice.reserve_goal(start, goal, FOOTPRINT)
+    alice.reserve_poses(FOOTPRINT, start, goal)
     assert bob.blocked_robots(goal, FOOTPRINT)
     assert not bob.blocked_robots(Pose2D(9.0, 0.0, 0.0), FOOTPRINT)
 

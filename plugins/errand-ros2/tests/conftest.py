@@ -24,7 +24,7 @@ from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import ScriptedRobot, Start
 
 START = Pose2D(1.0, -0.5, 0.3)
-collect_ignore = [] if find_spec("rclpy") and find_spec("nav2_msgs") else ["test_rclpy.py"]
+collect_ignore = [] if find_spec("rclpy") and find_spec("nav2_msgs") else ["test_rclpy.py", "test_rclpy_nav2.py"]
 """What `make ros` brings the means for."""
 
 

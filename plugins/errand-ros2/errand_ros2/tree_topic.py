@@ -11,6 +11,7 @@ from py_trees.decorators import Decorator
 
 from errand_ros2.messages import Fields, time_of
 from errand_ros2.wire.node import Node
+from errand_ros2.wire.types import LATCHED
 from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec, Snapshot
 
@@ -23,7 +24,7 @@ class TreeTopic:
     """Publisher of one robot's tree, and the services `open`, `close` and `reconfigure` by which viewers find it."""
 
     def __init__(self, node: Node) -> None:
-        self._out = node.publisher("tree/snapshots", f"{_TYPES}/msg/BehaviourTree")
+        self._out = node.publisher("tree/snapshots", f"{_TYPES}/msg/BehaviourTree", LATCHED)
         self._last: Any = None
         opened, done = {"topic_name": node.absolute("tree/snapshots")}, {"result": True}
         node.answer("tree/snapshot_streams/open", f"{_TYPES}/srv/OpenSnapshotStream", lambda _: opened)
@@ -31,9 +32,8 @@ class TreeTopic:
         node.answer("tree/snapshot_streams/reconfigure", f"{_TYPES}/srv/ReconfigureSnapshotStream", lambda _: done)
 
     def put(self, now_s: float, tree: CompiledTree, states: Snapshot) -> None:
-        """Publishes a tree of which a state has changed, while somebody subscribes."""
-        seen = (tree.mission_name, states) if self._out.is_heard else None
-        if seen is not None and seen != self._last:
+        """Publishes a tree of which a state has changed; late viewers get the last one."""
+        if (seen := (tree.mission_name, states)) != self._last:
             self._out.put(snapshot(now_s, tree.root, states))
         self._last = seen
 
@@ -52,6 +52,7 @@ def _behaviour(node: NodeSpec, states: Snapshot) -> Fields:
     running = (_id(each) for each in node.children if states[each.path_id].status is Status.RUNNING)
     told = {"status": _STATUS[state.status], "message": state.message, "is_active": state.status is Status.RUNNING}
     names = {"name": node.name, "class_name": node.kind, "type": kind, "blackbox_level": _NOT_A_BLACKBOX}
+    names["additional_detail"] = "WithMemory" if node.children else ""
     links = {"own_id": _id(node), "child_ids": [*map(_id, node.children)], "current_child_id": next(running, None)}
     return names | told | links
 

@@ -23,7 +23,7 @@ from ros_client import soon
 
 KEPT = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL, reliability=ReliabilityPolicy.RELIABLE)
 LOSSY = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
-LATCHED = {"/map", "/tf_static", "/alice/robot_description"}
+LATCHED = {"/map", "/tf_static", "/alice/robot_description", "/alice/tree/snapshots"}
 LATCHED |= {f"/alice/{name}" for name in ("task_channel", "object_to_detect", "object_destination")}
 SENSORS = re.compile(r"/alice/(imu|scan|points|.*/image|.*/camera_info|.*/image/compressed|.*/compressedDepth)")
 PATIENCE_S = 20.0

@@ -4,14 +4,16 @@ from types import SimpleNamespace
 
 from py_trees.common import Status
 
-from errand_ros2.tree_topic import snapshot
-from errand_ros2.wire.types import ros_types
+from errand_ros2.tree_topic import TreeTopic, snapshot
+from errand_ros2.wire.types import LATCHED, ros_types
 from executive.testing.bench import room_knowledge
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
 from executive.words.mission import Mission
 
 TREE = "py_trees_ros_interfaces/msg/BehaviourTree"
+NAMES = ros_types().store.types["py_trees_ros_interfaces/msg/Behaviour"]
+"""By whose constants viewers tell states and types."""
 
 
 def test_a_snapshot_has_the_nodes_of_the_tree_with_their_links_and_states():
@@ -37,10 +39,17 @@ def test_a_snapshot_has_the_nodes_of_the_tree_with_their_links_and_states():
         for child in each.child_ids:
             assert found[child.uuid.tobytes()].parent_id.uuid.tobytes() == each.own_id.uuid.tobytes()
     running = [each for each in told.behaviours if each.is_active]
-    # RUNNING is 2 in the message; the current children lead to the leaf that runs
-    assert {each.status for each in running} == {2} and len(running) == len(on_the_way)
+    # the current children lead to the leaf that runs
+    assert {each.status for each in running} == {NAMES.RUNNING} and len(running) == len(on_the_way)
     at = top
     while any(at.current_child_id.uuid):
         at = found[at.current_child_id.uuid.tobytes()]
-    assert (at.name, at.type, at.message) == (leaf.name, 1, "speaking")
-    assert {each.type for each in told.behaviours} >= {1, 2}
+    assert (at.name, at.type, at.message) == (leaf.name, NAMES.BEHAVIOUR, "speaking")
+    assert {each.type for each in told.behaviours} >= {NAMES.BEHAVIOUR, NAMES.SEQUENCE}
+
+
+def test_late_viewers_get_the_last_tree_without_which_those_of_py_trees_ros_take_none():
+    published = []
+    node = SimpleNamespace(publisher=lambda *given: published.append(given), absolute=str, answer=lambda *_: None)
+    TreeTopic(node)
+    assert published == [("tree/snapshots", TREE, LATCHED)]

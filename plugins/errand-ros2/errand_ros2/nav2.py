@@ -14,7 +14,7 @@ import numpy as np
 from errand_ros2.messages import MAP_FRAME, Fields, pose_stamped
 from errand_ros2.readings import planar_pose
 from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError, SentGoal
-from errand_ros2.wire.node import Place, Session
+from errand_ros2.wire.node import Place
 from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import ros_types
 from skills.api import Cause, FreeSpace, PlanningError
@@ -158,40 +158,41 @@ class _Trip:
         threading.Thread(target=self._pursue, args=(options, poses), daemon=True).start()
 
     def _pursue(self, options: Nav2Drive, poses: Sequence[Fields]) -> None:
-        told = ""
+        """Sends the goal, and cancels it when the trip is over before the goal has ended."""
+        kind, told = _THROUGH if options.through_m else _TO_POSE, ""
         try:
             with open_session(Place.parse(options.network)) as session:
-                told = f" ({session.told})"
-                self._send(session, options, poses)
-        except NoAnswerError:
-            what = f"No Nav2 has accepted the goal on {options.action} within {options.limit_s:g} s{told}."
+                node, told = session.node("errand_drive"), f" ({session.told})"
+                node.subscribe(f"{options.action}/_action/feedback", f"{kind}_FeedbackMessage", self._hear)
+                client = ActionClient(node, options.action, kind)
+                if (sent := _sent(client, options, poses)) is None:
+                    self.failure = SkillFailure(Cause.PLANNING, f"Nav2 rejects the goal on {options.action}.")
+                    return
+                self.sent = sent
+                self.over.wait()
+                if not sent.ended.is_set():
+                    client.cancel(sent)
+                    sent.ended.wait(options.limit_s)
+        except Exception as error:  # of the wire, too
+            what = f"There is no drive by Nav2 on {options.action}{told}: {error}."
             self.failure = SkillFailure(Cause.PRECONDITION, what, final=True)
-        except InputError as error:
-            self.failure = SkillFailure(Cause.PRECONDITION, f"No drive by Nav2: {error}", final=True)
-
-    def _send(self, session: Session, options: Nav2Drive, poses: Sequence[Fields]) -> None:
-        """Sends the goal, and cancels it when the trip is over before the goal has ended."""
-        node, kind = session.node("errand_drive"), _THROUGH if options.through_m else _TO_POSE
-        node.subscribe(f"{options.action}/_action/feedback", f"{kind}_FeedbackMessage", self._hear)
-        client, tree = ActionClient(node, options.action, kind), {"behavior_tree": options.behavior_tree}
-        goals = ros_types().make("nav_msgs/msg/Goals", goals=poses)
-        try:
-            goal = {"poses": goals} if options.through_m else {"pose": poses[-1]}
-            sent = client.send(goal | tree, limit_s=options.limit_s)
-        except TypeError:  # before Kilted, poses are a list
-            sent = client.send({"poses": poses} | tree, limit_s=options.limit_s)
-        if sent is None:
-            self.failure = SkillFailure(Cause.PLANNING, f"Nav2 rejects the goal on {options.action}.")
-            return
-        self.sent = sent
-        self.over.wait()
-        if not sent.ended.is_set():
-            client.cancel(sent)
-            sent.ended.wait(options.limit_s)
 
     def _hear(self, message: Any) -> None:
         if self.sent is not None and bytes(message.goal_id.uuid) == bytes(self.sent.identity["uuid"]):
-            self.left_m, self.heard = float(message.feedback.distance_remaining), self.heard + 1
+            left_m, self.heard = float(message.feedback.distance_remaining), self.heard + 1
+            self.left_m = left_m if math.isfinite(left_m) else self.left_m
+
+
+def _sent(client: ActionClient, options: Nav2Drive, poses: Sequence[Fields]) -> SentGoal | None:
+    """Sends the poses, or the last of them, as a goal; None when Nav2 rejects it. Raises NoAnswerError."""
+    tree = {"behavior_tree": options.behavior_tree}
+    if not options.through_m:
+        return client.send({"pose": poses[-1], **tree}, limit_s=options.limit_s)
+    try:
+        goals = ros_types().make("nav_msgs/msg/Goals", goals=poses)
+        return client.send({"poses": goals, **tree}, limit_s=options.limit_s)
+    except TypeError:  # before Kilted they are a list
+        return client.send({"poses": poses, **tree}, limit_s=options.limit_s)
 
 
 class Nav2Follower(PathFollower):
@@ -199,7 +200,7 @@ class Nav2Follower(PathFollower):
 
     def __init__(self, path: Path, footprint: Footprint, options: Nav2Drive) -> None:
         super().__init__(path, footprint, options)
-        self._by, self._goal, self._arrived = options, path.goal, False
+        self._by, self._arrived = options, False
         step_m = options.through_m or math.inf
         along = step_m * np.arange(1.0, self.length_m / step_m)
         rows = [*path.poses[np.searchsorted(progress_m(path.poses), along)], path.poses[-1]]
@@ -250,7 +251,8 @@ class Nav2Follower(PathFollower):
         if sent.status is not GoalStatus.SUCCEEDED:
             cause, words = failure_of(sent.result)
             raise SkillFailure(cause, f"Nav2 gave up: {words}.", final=cause is Cause.PRECONDITION)
-        rows, off_m = pose_array([pose, self._goal]), math.hypot(self._goal.x_m - pose.x_m, self._goal.y_m - pose.y_m)
+        rows = pose_array([pose, self._path.goal])
+        off_m = math.dist(rows[0, :2], rows[1, :2])
         if off_m > self._by.near_m:
             raise SkillFailure(Cause.POSTCONDITION, f"Nav2 says it is there, and the robot is {off_m:.2f} m off.")
         if self._footprint.base_kind is BaseKind.DIFFERENTIAL and off_m > _STEP_M:

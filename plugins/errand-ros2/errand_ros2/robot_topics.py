@@ -15,7 +15,7 @@ from errand_ros2.messages import MOST_COLUMNS, Fields
 from errand_ros2.wire.node import Node
 from errand_ros2.wire.types import LATCHED, SENSOR, Qos
 from skills.manipulation.arm.kinematics import arm_model
-from skills.robot import CameraCapabilities, Image, Mount, NoImageError, Robot
+from skills.robot import CameraCapabilities, Capabilities, Image, Mount, NoImageError, Robot
 
 IMAGE_PERIOD_S, BATTERY_PERIOD_S, _EPSILON_S = 0.2, 1.0, 1e-6
 _FRAMES: Final = ("odom", "body", "lidar", "hand")
@@ -60,19 +60,23 @@ class _Stream:
         self.out = [(node.publisher(f"{camera.source}/{name}", kind, SENSOR), make) for name, (kind, make) in topics]
 
 
+def frames_at(can: Capabilities, position_rad: Mapping[str, float]) -> dict[str, RigidTransform]:
+    """Returns the poses in the body of body, hand, head and cameras at positions of the joints, by name."""
+    found = {Mount.BODY.value: RigidTransform()}
+    if can.arm is not None and position_rad.keys() >= {*can.arm.joint_names}:
+        q_rad = np.array([position_rad[name] for name in can.arm.joint_names])
+        found[Mount.HAND.value] = arm_model(can).X_BH(q_rad)
+    if can.head is not None:
+        found[Mount.HEAD.value] = can.head.X_BF(*(position_rad.get(name, 0.0) for name in can.head.joint_names))
+    seen = [each for each in can.cameras if each.mount.value in found]
+    return found | {f"{each.source}_camera": found[each.mount.value] @ each.X_FC for each in seen}
+
+
 def frames_on_body(robot: Robot) -> dict[str, RigidTransform]:
     """Returns the poses in the body of all frames that the robot carries, by name."""
-    can, at = robot.capabilities(), robot.joints().position_rad
-    found = {"body": RigidTransform(), "base_link": RigidTransform()}
-    mounts = {Mount.BODY: found["body"]}
-    if can.arm is not None and at.keys() >= {*can.arm.joint_names}:
-        found["hand"] = mounts[Mount.HAND] = arm_model(can).X_BH(np.array([at[name] for name in can.arm.joint_names]))
-    if can.head is not None:
-        mounts[Mount.HEAD] = can.head.X_BF(*(at.get(name, 0.0) for name in can.head.joint_names))
-    for each in can.cameras:
-        if each.mount in mounts:
-            found[f"{each.source}_camera"] = X_BF = mounts[each.mount] @ each.X_FC
-            found[f"{each.source}_camera_optical"] = X_BF
+    found = frames_at(robot.capabilities(), robot.joints().position_rad)
+    found |= {f"{name}_optical": X_BF for name, X_BF in found.items() if name.endswith("_camera")}
+    found["base_link"] = found["body"]
     return found if (scan := robot.scan()) is None else {**found, "lidar": scan.X_BL}
 
 

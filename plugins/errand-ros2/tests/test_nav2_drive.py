@@ -137,7 +137,8 @@ def test_a_rejected_goal_is_a_failure(given):
 def test_no_server_is_a_final_failure_that_names_action_and_network(wire):
     failure = Drives(Nav2Drive(action="/bob/navigate_to_pose", network=wire[1], limit_s=0.3)).fails()
     assert (failure.cause, failure.final) == (Cause.PRECONDITION, True)
-    assert failure.message.startswith("No Nav2 has accepted the goal on /bob/navigate_to_pose within 0.3 s (domain")
+    assert failure.message.startswith("There is no drive by Nav2 on /bob/navigate_to_pose (domain")
+    assert failure.message.endswith("the action's server does not answer.")
 
 
 def test_a_network_that_is_none_is_a_failure():

@@ -19,11 +19,11 @@ from errand_ros2 import readings
 from errand_ros2.adapter.clocks import RobotClock
 from errand_ros2.adapter.description import CameraFile, Description
 from errand_ros2.readings import newer, planar_pose, transform_of
+from errand_ros2.robot_topics import frames_at
 from errand_ros2.wire.node import Node
 from errand_ros2.wire.types import LATCHED, SENSOR
 from skills.estimate.scan_points import scan_of_points
 from skills.geometry import compose, inverse
-from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import (
     Battery,
     Capabilities,
@@ -32,7 +32,6 @@ from skills.robot import (
     Image,
     Imu,
     Joints,
-    Mount,
     NoImageError,
     Odometry,
     OwnLocalisation,
@@ -243,22 +242,10 @@ class SensedRobot:
         can, X_OB = self._description.capabilities, self._X_OB(stamp_s)
         with self._lock:
             joints = min(self._joints, key=lambda each: abs(each.stamp_s - stamp_s), default=None)
-        if X_OB is None:
+        found = frames_at(can, {} if joints is None else joints.position_rad)
+        if X_OB is None or (can.arm is not None and "hand" not in found):
             return None
-        edges = {"body": ("odom", X_OB)}
-        at = {} if joints is None else joints.position_rad
-        if can.arm is not None:
-            if not at.keys() >= {*can.arm.joint_names}:
-                return None
-            edges["hand"] = ("body", arm_model(can).X_BH(np.array([at[name] for name in can.arm.joint_names])))
-        if can.head is not None:
-            pan, tilt = (at.get(name, 0.0) for name in can.head.joint_names)
-            edges["head"] = ("body", can.head.X_BF(pan, tilt))
-        parents = {Mount.BODY: "body", Mount.HAND: "hand", Mount.HEAD: "head"}
-        for camera in can.cameras:
-            if parents[camera.mount] in edges:
-                edges[f"{camera.source}_camera"] = (parents[camera.mount], camera.X_FC)
-        return FrameTree(edges)
+        return FrameTree({**{name: ("body", X_BF) for name, X_BF in found.items()}, "body": ("odom", X_OB)})
 
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
         """Subscribes for one picture with depth. Raises ValueError and NoImageError."""

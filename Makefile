@@ -100,7 +100,7 @@ nightly: env voices browser
 	$(PYTEST) -m nightly --durations-file=out/tests/nightly.json
 
 ros: $(ROS)/.ready
-	if [ -e $< ]; then $(ROS)/bin/python -m pytest -n 0 plugins/errand-ros2/tests/wire plugins/errand-ros2/tests/test_rclpy.py; fi
+	if [ -e $< ]; then $(ROS)/bin/python -m pytest -n 0 plugins/errand-ros2/tests/wire $(wildcard plugins/errand-ros2/tests/test_rclpy*.py plugins/errand-ros2/tests/test_nav2_drive.py); fi
 
 # Errand's own packages are those of .venv.
 $(ROS)/.ready: $(VENV)/.ready plugins/errand-ros2/pyproject.toml .ci/ros $(shell find plugins/errand-ros2/errand_ros2/interfaces -type f)

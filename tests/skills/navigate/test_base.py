@@ -43,3 +43,26 @@ def test_the_base_may_leave_an_obstacle_that_it_is_close_to():
     drives, pose, _ = driven((-0.4, 0.0, 0.0), wall_at(0.5), 1.0)
     assert drives
     assert pose.x_m < -0.2
+
+
+def test_the_base_halts_another_driver_before_it_drives_or_stops():
+    robot, halted = TableRobot(), []
+    base = Base(context_of(robot, costmap=BlockCostmap()))
+    halt = halted.append
+    for take_back in (lambda: base.drive((0.1, 0.0, 0.0)), base.stop, base.stop):
+        base.leave_to(lambda: halt("halted"))
+        take_back()
+    base.stop()
+    assert halted == ["halted"] * 3
+
+
+def test_the_base_stands_still_after_it_has_stopped_another_driver():
+    robot, halted = TableRobot(), []
+    base = Base(context_of(robot, costmap=BlockCostmap()))
+    base.drive((0.5, 0.0, 0.0))
+    robot.advance(TICK_S)
+    base.leave_to(halted.clear)
+    base.leave_to(halted.clear)  # nothing new
+    base.stop()
+    robot.advance(TICK_S)
+    assert robot.odometry().velocity == pytest.approx((0.0, 0.0, 0.0))

@@ -1,6 +1,7 @@
 """A Nav2 whose behaviour a test scripts: it takes goals of whole drives, and drives straight to them."""
 
 import math
+import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -29,12 +30,14 @@ FAST_M_S, STILL_M_S, PAUSED_TICKS = 0.4, 0.05, 40
 class ScriptedNav2:
     """Serves one action below a namespace. The test calls `step` at each tick with the pose of the base on Nav2's map.
 
-    `rejects`, `dies` after acceptance (neither feedback nor result), aborts with the code `fails` and its `says`,
-    `lies` that it has arrived. `poses` are those of the last goal; `told` counts feedback messages, `cancelled` goals.
+    `rejects`, `is_deaf` to goals, `dies` after acceptance (neither feedback nor result), aborts with the code `fails`
+    and what it `says`, `lies` that it has arrived. `poses` are those of the last goal; `told` counts feedback messages,
+    `cancelled` goals.
     """
 
     def __init__(self, session, action=TO_POSE, space="/alice"):
-        self.rejects, self.dies, self.fails, self.says, self.lies = False, False, 0, "", False
+        self.rejects, self.is_deaf, self.dies, self.fails, self.says, self.lies = False, False, False, 0, "", False
+        self._ended = threading.Event()
         self.goals, self.poses, self.told, self.cancelled = [], [], 0, 0
         self._goal, self._left, self._pool = None, [], ThreadPoolExecutor(2)
         self.name, node = f"{space}/{action}", session.node("bt_navigator", space)
@@ -43,7 +46,9 @@ class ScriptedNav2:
         )
 
     def _accept(self, goal):
-        if self.rejects:
+        if self.is_deaf:
+            self._ended.wait()
+        if self.rejects or self.is_deaf:
             return False
         message = goal.message
         stamped = [message.pose] if hasattr(message, "pose") else message.poses.goals
@@ -92,6 +97,7 @@ class ScriptedNav2:
         return (SPEED_M_S if off_m >= NEAR_M and abs(turn) < 0.3 else 0.0), wz
 
     def close(self):
+        self._ended.set()
         self._pool.shutdown()
 
 

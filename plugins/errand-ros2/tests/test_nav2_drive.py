@@ -141,6 +141,13 @@ def test_no_server_is_a_final_failure_that_names_action_and_network(wire):
     assert failure.message.endswith("the action's server does not answer.")
 
 
+def test_a_server_that_does_not_answer_a_goal_is_a_failure(given):
+    nav2, options = given
+    nav2.is_deaf = True
+    failure = Drives(replace(options, limit_s=0.5)).fails()
+    assert (failure.cause, "the action's server does not answer" in failure.message) == (Cause.PRECONDITION, True)
+
+
 def test_a_network_that_is_none_is_a_failure():
     failure = Drives(Nav2Drive(network="nowhere")).fails()
     assert (failure.cause, "'nowhere' is no ROS domain" in failure.message) == (Cause.PRECONDITION, True)

@@ -266,8 +266,9 @@ again, unless `max_age_s` (seconds, or a text such as `2 min`) lets an earlier a
 door on its way counts as an answer, too.
 
 A value has a name and a type: a number, a text, or true and false. It comes from `variables` (the file's values at
-the beginning), from `set`, and from `gives`: `{answer: NAME}` beside a question, a `check` or an `ask`, `{count:
-NAME}` beside a sentence that counts, and `{PORT: NAME}` beside a skill. A value of `variables` keeps its type. A
+the beginning), from `set`, and from `gives`: `{answer: NAME}` beside a question (the number
+for *how many*), a `check` or an `ask`, `{count: NAME}` beside a sentence that counts, and `{PORT: NAME}` beside a
+skill. A value of `variables` keeps its type. A
 value that is not set on every path to a step is unknown there, and its use is refused before the mission starts.
 
 An expression has numbers, texts in quotes, `true`, `false` and names; `+ - * / // %`; `== != < <= > >=`; `and`, `or`,

@@ -37,14 +37,15 @@ def describe_unknown(seen: ObjectObservation) -> str:
     return f"something {size} on the {seen.surface}"
 
 
-def count_sentence(found: Sequence[ObjectObservation], surfaces: Sequence[Surface]) -> str:
-    """Counts objects by kind: "there are two wrenches on the bench"."""
+def count_sentence(found: Sequence[ObjectObservation], surfaces: Sequence[Surface], *, at_least: bool = False) -> str:
+    """Counts objects by kind: "there are two wrenches on the bench", or "there are at least two wrenches ..."."""
     kinds = list(dict.fromkeys(str(seen.kind) for seen in found))
     numbers = {kind: sum(str(seen.kind) == kind for seen in found) for kind in kinds}
     counts = " and ".join(count_of(count, kind) for kind, count in numbers.items())
     places = dict.fromkeys(seen.surface for seen in found if seen.surface)
     where = " and ".join(f"the {name}" for name in places) or surface_names(surfaces)
-    return f"there {'is' if len(found) == 1 else 'are'} {counts} {'in' if kinds == [PERSON] else 'on'} {where}"
+    be = f"there {'is' if len(found) == 1 else 'are'}{' at least' if at_least else ''}"
+    return f"{be} {counts} {'in' if kinds == [PERSON] else 'on'} {where}"
 
 
 def count_of(count: int, kind: str) -> str:

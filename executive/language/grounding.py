@@ -164,7 +164,8 @@ class _Grounder:
         """Object of a task with its relations, and its default place if none is given."""
         if goal is None and target.name == EVERYTHING:
             raise RefusalError("everything from where? Name the surface or the room", [target.name])
-        if goal is None and (frame.takes or frame.looks):
+        counts = frame.object is not None and not (frame.object.count or frame.object.relations)
+        if goal is None and (frame.takes or (frame.looks and not counts)):  # a count is of the whole building
             goal = self.knowledge.default_place(frame.task, target.name)
         target = self._described(frame, target, goal)
         if target.name == ANYTHING and (not frame.looks or frame.goal is None):

@@ -4,7 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
+from itertools import chain, pairwise
 from typing import Any, Final
 
 from py_trees.behaviour import Behaviour
@@ -17,7 +17,7 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.context import ANSWER_TOPIC
 from executive.tree.node import NodeSpec
 from executive.words.goal import GoalKind
-from executive.words.schemas import DETECTIONS, SPEECH
+from executive.words.schemas import SPEECH
 from executive.words.slug import slug
 from skills.api import Part
 from skills.robot import Clock
@@ -61,8 +61,14 @@ def is_speech(node: NodeSpec) -> bool:
     return node.skill is not None and "text" in node.options.get("inputs", {}) and node.skill.uses == {Part.VOICE}
 
 
+def looks_of(node: NodeSpec) -> Mapping[str, Sequence[str]]:
+    """Returns the looks on which a node's answer rests: the path ids of the leaves for each surface or room."""
+    looks: Mapping[str, Sequence[str]] = node.options.get("looks", {}) if node.behaviour.answers else {}
+    return looks
+
+
 class Executions:
-    """Record of when a mission's steps and speech were executed; it lies on the blackboard and survives a restart.
+    """Record on the blackboard of when a mission's steps, speech and looks were executed; it survives a restart.
 
     The run calls `note_visit` with each node that a tick visits, then `after_tick`. A node that only repeats its result
     from before a restart keeps the times that it had then.
@@ -72,6 +78,7 @@ class Executions:
         self._board, self._clock = board, clock
         self._keys = history_keys(tree.robot_name, tree.mission_name)
         parts = {part.node or part.path_id for part in tree.parts}
+        parts |= {leaf for node in tree.root.walk() for leaves in looks_of(node).values() for leaf in leaves}
         self._parts = frozenset(n.path_id for n in tree.root.walk() if n.path_id in parts or is_speech(n))
         self._below: Mapping[str, frozenset[str]] = _below(tree.root, self._parts)
         self._base = frozenset(n.path_id for n in tree.root.walk() if n.skill is not None and Part.BASE in n.skill.uses)
@@ -168,29 +175,26 @@ class Findings:
     """Collection of the answers and the speech of one mission.
 
     Any node adds a finding by publishing under `ANSWER_TOPIC`: `node`, `question`, `answer` (a truth value, a text or a
-    number) and `message`, the sentence. The collection adds the time, the robot and the time of the last picture. It
-    lies on the blackboard, so that a mission that continues after a restart has its earlier findings. A node listed
-    under `answered_before` repeats its answer without a second finding.
+    number, perhaps `at_least` so many) and `message`, the sentence. The collection adds the time and the robot. It lies
+    on the blackboard, so that a mission that continues after a restart has its earlier findings. A node listed under
+    `answered_before` repeats its answer without a second finding.
     """
 
     def __init__(self, clock: Clock, board: Board, robot_name: str, mission_name: str) -> None:
         self._clock, self._board, self._robot_name = clock, board, robot_name
         self._keys = history_keys(robot_name, mission_name)
-        self._seen_s: float | None = None
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
         """Records a message of the mission and returns it; adds the time and the robot's name to an answer."""
         if topic == ANSWER_TOPIC:
             message = {**message, "robot": self._robot_name, "t": round(self._clock.now(), 6)}
-            finding = replace(_finding(message), seen_s=self._seen_s)
+            finding = _finding(message)
             again = frozenset(self._board.get(self._keys.answered_before, ()))
             if finding.path_id in again:
                 self._board.put(self._keys.answered_before, again - {finding.path_id})
             before = next((one for one in reversed(self.findings) if one.path_id == finding.path_id), None)
             if finding.path_id not in again or before is None or before.answer != finding.answer:
                 self._board.put(self._keys.findings, (*self.findings, finding))
-        elif topic == DETECTIONS:
-            self._seen_s = float(message["stamp_s"])
         elif topic == SPEECH:
             now_s = round(self._clock.now(), 6)
             asked, silent = bool(message.get("asked", False)), str(message.get("silent", ""))
@@ -216,7 +220,8 @@ def _finding(message: Mapping[str, Any]) -> Finding:
     plain = answer if answer is None or isinstance(answer, bool | str | int | float) else str(answer)
     plain = str(plain) if isinstance(plain, float) and not math.isfinite(plain) else plain
     path_id, question, sentence = (str(message.get(name, "")) for name in ("node", "question", "message"))
-    return Finding(path_id, float(message["t"]), question, plain, sentence or str(answer))
+    least = bool(message.get("at_least", False))
+    return Finding(path_id, float(message["t"]), question, plain, sentence or str(answer), least)
 
 
 def claim(message: str, findings: Sequence[Finding], skipped: Sequence[str] = ()) -> str:
@@ -247,16 +252,18 @@ def achieved(reached: Sequence[tuple[GoalKind, str, str]], message: str) -> str:
 
 def findings_in_words(findings: Sequence[Finding]) -> str:
     """Text of the answers: a single one in full, several shortened and without repetition, the rest as "and N more"."""
-    findings = [one for one in findings if not any(_repeats(one, other) for other in findings)]
+    pairs = [(look, decision) for look, decision in pairwise(findings) if _repeats(look, decision)]
+    again = [decision if look.answer == decision.answer else look for look, decision in pairs]
+    findings = [one for one in findings if one not in again]
     counts = Counter(finding.sentence for finding in findings)
     if len(counts) == 1 and len(findings) == 1:
         return findings[0].sentence
     return _counted(counts)
 
 
-def _repeats(decision: Finding, look: Finding) -> bool:
-    """Returns whether a decision on one condition says again what the look in it has just found."""
-    inside = look.path_id.startswith(f"{decision.path_id}/") and look.t_s == decision.t_s
+def _repeats(look: Finding, decision: Finding) -> bool:
+    """Returns whether a decision on one condition rests on the look that was just before it."""
+    inside = look.path_id.startswith(f"{decision.path_id}/")
     return inside and not any(word in decision.question for word in _JOINED)
 
 

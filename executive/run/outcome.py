@@ -29,7 +29,7 @@ class Outcome(enum.Enum):
 class Finding:
     """Answer that a node gave or received at `t_s` (s on the robot's clock), as a value and as a sentence.
 
-    `seen_s` is the time of the mission's last picture before it (None: there was none).
+    A number is the least possible one if it is `at_least` so.
     """
 
     path_id: str
@@ -37,7 +37,7 @@ class Finding:
     question: str
     answer: bool | str | float | None
     sentence: str
-    seen_s: float | None = None
+    at_least: bool = False
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class RobotResult:
     outcome: Outcome
     cause: Cause | None
     message: str
-    answers: Mapping[str, bool] = field(default_factory=dict)
+    answers: Mapping[str, int] = field(default_factory=dict)
     states: Snapshot = field(default_factory=dict)
     preempting: tuple[RobotResult, ...] = ()
     findings: tuple[Finding, ...] = ()

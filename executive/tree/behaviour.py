@@ -186,7 +186,7 @@ class ExplainedNode(_TakesKeywords, Explained):
     def abandon(self) -> None:
         """Ends a running skill after the run; does nothing without one."""
 
-    def answered(self) -> bool | None:
+    def answered(self) -> int | None:
         """Returns the node's answer to a question of the mission; None without one."""
         return None
 

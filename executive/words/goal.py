@@ -70,8 +70,9 @@ class GoalCondition:
     of the objects or of the robot (any of the regions). `person` receives the object or, if the class is "person", is
     searched for (None: anyone); to be met, `person` must stand in `goal` (empty: anywhere). `task` is the word of the
     task whose page judges an OWN condition, for which `spoken_s` has the times at which the robot spoke, and `said`
-    what it said. `answer` is the answer that the robot gave at `answered_s` (None: now). `robot` must act (None: any).
-    `relations` say which objects of the source are meant, or for PLACED where in the goal.
+    what it said. `answer` is the answer that the robot gave at `answered_s` (None: now): yes, no, or a number, perhaps
+    `at_least` so many; `looked_s` has its looks: the name of the source, begin and end (s). `robot` must act (None:
+    any). `relations` say which objects of the source are meant, or for PLACED where in the goal.
 
     `when` says at which times the condition must hold. The step ran from `began_s` (None: since `since_s`) to `ended_s`
     (None: it ends now). A later step of the same mission may lift the objects again within the intervals `taken_s`.
@@ -85,8 +86,10 @@ class GoalCondition:
     goal: tuple[Region, ...] = ()
     maybe: tuple[Region, ...] = ()
     person: str | None = None
-    answer: bool | None = None
+    answer: int | None = None
+    at_least: bool = False
     answered_s: float | None = None
+    looked_s: tuple[tuple[str, float, float], ...] = ()
     spoken_s: tuple[float, ...] = ()
     said: tuple[str, ...] = ()
     robot: str | None = None

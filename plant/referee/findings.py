@@ -1,8 +1,9 @@
-"""Findings of the referee, helpers of all judges, and the judges of company and pictures."""
+"""Findings of the referee, helpers of all judges, and the judges of company, pictures and answers."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -14,6 +15,7 @@ from skills.relations import Scene, Standing, choose
 from skills.robot import FloatArray
 
 NAMED_REGIONS = 3
+PERSON = "person"
 NEAR_M: Final = 2.0
 """Greatest distance of the robot's body from a person to whom it has gone."""
 SLACK_M: Final = 0.05
@@ -146,3 +148,72 @@ def _shows(taken: TakenPicture, condition: GoalCondition, truth: Truth) -> bool:
     hides_m = math.inf if condition.source else HIDES_M
     middles = [(*np.mean(each.polygon_W, axis=0), 0.5 * (each.z_min_m + each.z_max_m)) for each in condition.goal]
     return all(taken.shows(np.array(middle), hides_m) for middle in middles)
+
+
+def of_class(condition: GoalCondition, truth: Truth) -> list[ObjectHistory]:
+    """Objects of the classes that a condition is about."""
+    return [one for one in truth.histories if not condition.classes or one.class_name in condition.classes]
+
+
+def wanted(condition: GoalCondition) -> str:
+    """Name of what a condition is about."""
+    return condition.wanted or " or ".join(condition.classes) or "object"
+
+
+def judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
+    """Judges an answer by what was there while the robot looked; what was there for a part of it may count or not."""
+    verb, told, people = "is" if condition.answered_s is None else "was", condition.answer, truth.persons_of(condition)
+    found: Iterable[tuple[str, _Places]]
+    if condition.classes == (PERSON,):
+        on, who, found = "in", condition.person or "nobody", ((name, partial(_stood, people[name])) for name in people)
+        nothing = f"{who} {verb} {'not ' if condition.person else ''}in {where(condition.source)}"
+    else:
+        objects = of_class(condition, truth)
+        on, found = "on", ((definite(one.name), partial(_rested, one, condition, truth)) for one in objects)
+        nothing = f"there is no {wanted(condition)}{f' on {where(condition.source)}' if condition.source else ''}"
+    there, aside = list[str](), list[str]()
+    for name, places in found:
+        is_sure, region = _seen_at(condition, places, truth)
+        if region is not None:
+            (there if is_sure else aside).append(f"{name} {verb} {on} {the(region.name)}")
+    most = len(there) + len(aside)
+    if told is None or isinstance(told, bool):
+        right = told is not None and (most >= condition.needed if told else len(there) < condition.needed)
+    else:
+        right = told <= most and (condition.at_least or told >= len(there))
+    return Finding(right, f"the answer was {said(condition)}, and {' and '.join((*there, *aside)) or nothing}.")
+
+
+def said(condition: GoalCondition) -> str:
+    """Text of the answer that a condition is about: "yes", "no", "nothing", "2" or "at least 2"."""
+    number = f"at least {condition.answer}" if condition.at_least else str(condition.answer)
+    return {"True": "yes", "False": "no", "None": "nothing"}.get(number, number)
+
+
+_Places = Callable[[float, float], Iterable[FloatArray | None]]
+"""Returns the places of a person or an object in an interval (s), None where it is none that is meant."""
+
+
+def _stood(path: TimedPath, from_s: float, until_s: float) -> Iterable[FloatArray]:
+    return (path.position_at(from_s), *path.positions_between(from_s, until_s)[1:])
+
+
+def _rested(
+    one: ObjectHistory, condition: GoalCondition, truth: Truth, from_s: float, until_s: float
+) -> Iterable[FloatArray | None]:
+    for time_s in (from_s, *(each for each in one.rested_s if from_s < each < until_s), until_s):
+        p_W = one.place_at(time_s)
+        yield p_W if p_W is not None and has_relations(one, p_W, time_s, condition, truth) else None
+
+
+def _seen_at(condition: GoalCondition, places: _Places, truth: Truth) -> tuple[bool, Region | None]:
+    """Region where something was while the robot looked there, and whether it surely was: during the whole look."""
+    now_s, found = truth.now_s if condition.answered_s is None else condition.answered_s, None
+    for region in (*condition.source, *condition.maybe):
+        looks = [look for look in condition.looked_s if look[0] == region.name] or condition.looked_s
+        span_s = min((look[1] for look in looks), default=now_s), max((look[2] for look in looks), default=now_s)
+        inside = [p_W is not None and region.contains(p_W) for p_W in places(*span_s)]
+        if all(inside) and region in condition.source:
+            return True, region
+        found = found or (region if any(inside) else None)
+    return False, found

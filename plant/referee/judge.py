@@ -10,10 +10,14 @@ from plant.referee.findings import (
     distance_m,
     has_relations,
     is_past,
+    judge_answered,
     judge_company,
     judge_pictured,
+    of_class,
     region_at,
+    said,
     the,
+    wanted,
     where,
 )
 from plant.referee.object_history import ON_TRAY_GAP_S, SETTLE_S, Lift, ObjectHistory, TimedPath, Truth
@@ -21,7 +25,6 @@ from skills.inputs.errors import definite, listing
 from skills.inputs.plugins import PluginDefect, call_plugin
 from skills.robot import FloatArray
 
-PERSON = "person"
 DOOR_LOOK_S = 2.0
 """Longest time between the robot's look at a door and its answer."""
 _ABOUT_OBJECTS = frozenset(
@@ -60,7 +63,7 @@ def judge(conditions: Sequence[GoalCondition], truth: Truth, *, collisions: Sequ
 
 def _is_about(condition: GoalCondition, objects: Sequence[ObjectHistory], truth: Truth) -> bool:
     """Returns whether a condition is about one of some objects."""
-    return condition.kind in _ABOUT_OBJECTS and any(one in objects for one in _of_class(condition, truth))
+    return condition.kind in _ABOUT_OBJECTS and any(one in objects for one in of_class(condition, truth))
 
 
 def _taken_again(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:
@@ -77,7 +80,7 @@ def _judge_grasped(condition: GoalCondition, truth: Truth) -> Finding:
     """Judges whether the objects were lifted from the source, and held at the required times."""
     until_s = truth.ended_s(condition)
     from_s = condition.from_s if condition.when is When.SOME_TIME else condition.since_s
-    candidates = ((one, _lift(one, condition, from_s, until_s)) for one in _of_class(condition, truth))
+    candidates = ((one, _lift(one, condition, from_s, until_s)) for one in of_class(condition, truth))
     lifted = {
         one: lift
         for one, lift in candidates
@@ -118,7 +121,7 @@ def _judge_handed_over(condition: GoalCondition, truth: Truth) -> Finding:
     if not people:
         return Finding(False, f"There is no person {condition.person or ''} to hand anything to.".replace("  ", " "))
     until_s = truth.ended_s(condition)
-    objects = [one for one in _of_class(condition, truth) if _lift(one, condition, condition.since_s, until_s)]
+    objects = [one for one in of_class(condition, truth) if _lift(one, condition, condition.since_s, until_s)]
     given = [one for one in objects if _was_given(one, people, condition, truth)]
     if is_past(condition):
         done = given
@@ -151,7 +154,7 @@ def _why_not_handed(
 ) -> str:
     """Sentence that says why a hand-over failed: where the object is, or which object was wanted."""
     if not objects:
-        return f"No {_wanted(condition)} was brought{_out_of(condition.source)}."
+        return f"No {wanted(condition)} was brought{_out_of(condition.source)}."
     history = next((one for one in objects if one.holder is not None), objects[0])
     apart = min(distance_m(history.last.p_WO, p) for p in people.values())
     there = f"{history.last.p_WO[2]:.2f} m high, {apart:.2f} m from {_either(people)}"
@@ -165,7 +168,7 @@ def _why_not_handed(
 def _judge_placed(condition: GoalCondition, truth: Truth) -> Finding:
     """Judges whether the objects rest in the goal, released by the gripper."""
     until_s = truth.ended_s(condition)
-    objects = [one for one in _of_class(condition, truth) if _lift(one, condition, condition.since_s, until_s)]
+    objects = [one for one in of_class(condition, truth) if _lift(one, condition, condition.since_s, until_s)]
     put = {one: p_W for one in objects if (p_W := _put_in(one, condition, truth)) is not None}
     done = {one: p_W for one, p_W in put.items() if has_relations(one, p_W, until_s, condition, truth)}
     if len(done) >= condition.needed:
@@ -174,7 +177,7 @@ def _judge_placed(condition: GoalCondition, truth: Truth) -> Finding:
         ons = (f"{definite(one.name)} {verb} {_on(regions[:1])}" for one, regions in rests)
         return Finding(True, f"{' and '.join(ons)}.")
     if not objects:
-        return Finding(False, f"No {_wanted(condition)} was brought{_out_of(condition.source)}.")
+        return Finding(False, f"No {wanted(condition)} was brought{_out_of(condition.source)}.")
     elsewhere = [history for history in objects if history not in done]
     if not elsewhere:
         return Finding(False, f"{_tally(done, condition)} put {_on(condition.goal)}.")
@@ -249,43 +252,12 @@ def _judge_at(condition: GoalCondition, robot: str, truth: Truth) -> Finding:
     return Finding(False, f"{robot} {verb} at ({x:.2f}, {y:.2f}), not at {where(condition.goal)}.")
 
 
-def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
-    """Judges whether an answer was true at the time at which it was given."""
-    then_s, aside = condition.answered_s, []
-    if condition.classes == (PERSON,):
-        when_s = truth.now_s if then_s is None else then_s
-        people = ((name, path.position_at(when_s)) for name, path in truth.persons_of(condition).items())
-        verb = "is" if then_s is None else "was"
-        there = [f"{name} {verb} in {on}" for name, p_W in people if (on := region_at(condition.source, p_W))]
-        who = condition.person or "nobody"
-        nothing = f"{who} {verb} {'not ' if condition.person else ''}in {where(condition.source)}"
-    else:
-        when_s = truth.now_s if then_s is None else then_s
-        rest = [
-            (each.name, p_W)
-            for each in _of_class(condition, truth)
-            if (p_W := each.place_at(then_s) if then_s is not None else each.last.p_WO if each.resting else None)
-            is not None
-            and has_relations(each, p_W, when_s, condition, truth)
-        ]
-        verb = "is" if then_s is None else "was"
-        there = [f"{definite(name)} {verb} on {on}" for name, p_W in rest if (on := region_at(condition.source, p_W))]
-        aside = [f"{definite(name)} {verb} on {on}" for name, p_W in rest if (on := region_at(condition.maybe, p_W))]
-        nothing = f"there is no {_wanted(condition)}{f' on {where(condition.source)}' if condition.source else ''}"
-    most = len(there) + len(aside)
-    right = len(there) < condition.needed if condition.answer is False else most >= condition.needed
-    said = {True: "yes", False: "no", None: "nothing"}[condition.answer]
-    found = " and ".join((*there, *aside)) or nothing
-    return Finding(condition.answer is not None and right, f"the answer was {said}, and {found}.")
-
-
 def _judge_door(condition: GoalCondition, truth: Truth) -> Finding:
     """Judges an answer by the state of the door while the robot looked; for a moving door, both answers are right."""
     was = _door_state(condition, truth, truth.now_s if condition.answered_s is None else condition.answered_s)
     is_open = condition.answer != (condition.wanted == "closed")
     right = condition.answer is not None and was in ("moving", "open" if is_open else "closed")
-    said = {True: "yes", False: "no", None: "nothing"}[condition.answer]
-    return Finding(right, f"the answer was {said}, and {the(condition.source[0].name)} was {was}.")
+    return Finding(right, f"the answer was {said(condition)}, and {the(condition.source[0].name)} was {was}.")
 
 
 def _judge_opened(condition: GoalCondition, truth: Truth) -> Finding:
@@ -359,7 +331,7 @@ _JUDGES: Mapping[GoalKind, Callable[[GoalCondition, Truth], Finding]] = {
     GoalKind.HANDED_OVER: _judge_handed_over,
     GoalKind.PLACED: _judge_placed,
     GoalKind.WENT: _judge_went,
-    GoalKind.ANSWERED: _judge_answered,
+    GoalKind.ANSWERED: judge_answered,
     GoalKind.DOOR_OPEN: _judge_door,
     GoalKind.DOOR_OPENED: _judge_opened,
     GoalKind.CLEARED: _judge_cleared,
@@ -367,10 +339,6 @@ _JUDGES: Mapping[GoalKind, Callable[[GoalCondition, Truth], Finding]] = {
     GoalKind.PICTURED: judge_pictured,
     GoalKind.OWN: _judge_own,
 }
-
-
-def _of_class(condition: GoalCondition, truth: Truth) -> list[ObjectHistory]:
-    return [one for one in truth.histories if not condition.classes or one.class_name in condition.classes]
 
 
 def _lift(history: ObjectHistory, condition: GoalCondition, from_s: float, until_s: float) -> Lift | None:
@@ -400,15 +368,11 @@ def _were(histories: Sequence[ObjectHistory]) -> str:
     return "was" if len(histories) == 1 else "were"
 
 
-def _wanted(condition: GoalCondition) -> str:
-    return condition.wanted or " or ".join(condition.classes) or "object"
-
-
 def _tally(done: Collection[ObjectHistory], condition: GoalCondition) -> str:
     """Counts the objects that fulfil a condition: "no beer was", "1 of 2 beer was", "2 of 3 beer were"."""
     if condition.needed == 1:
-        return f"no {_wanted(condition)} was"
-    return f"{len(done)} of {condition.needed} {_wanted(condition)} {'was' if len(done) == 1 else 'were'}"
+        return f"no {wanted(condition)} was"
+    return f"{len(done)} of {condition.needed} {wanted(condition)} {'was' if len(done) == 1 else 'were'}"
 
 
 def _from(condition: GoalCondition, lift: Lift) -> str:

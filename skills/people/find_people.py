@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice
 from typing import ClassVar
 
@@ -20,6 +21,7 @@ from skills.manipulation.approach.base_placement import go_to_one
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import MovingSkill
 from skills.navigate.surroundings import NavigateInputs
+from skills.navigate.trip_planning import place_text
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark, turn_upright
 from skills.perception.people import (
     SeenPerson,
@@ -32,7 +34,7 @@ from skills.perception.people import (
 from skills.perception.people_tracking import SCAN_APART_M, PeopleTracker
 from skills.perception.point_cloud import camera_pose_W, project
 from skills.quantities import Coordinate, Count, Delay, Length, Share, Tries, Turn, TurnRate
-from skills.robot import CameraCapabilities, FloatArray, Image, Pose2D
+from skills.robot import FloatArray, Image, Pose2D
 from skills.routine import PATIENCE_S, Patience, Routine, SkillFailure
 from skills.world_model import PERSON
 
@@ -58,7 +60,16 @@ _VISIBLE = 0.65
 _AXIS_ASIDE = 0.2
 """Largest distance of a person's axis from the box, as a fraction of its length."""
 _VIEWS = 3
-"""Number of looks that must show a position if a camera has a fault, because a single one may miss somebody."""
+"""Number of looks that must show a position if a camera has a fault, because a single one may miss somebody.
+
+As many pictures that show a body whole, and no person there, show that it is no person.
+"""
+_WHOLE_M = (1.8, 3.5)
+"""Distances from which a picture shows a body whole and with depth."""
+_BESIDE_PERSON_M = 1.0
+"""Distance from a detected person within which a detector may miss another."""
+_BODY_M = 0.45
+"""Distance from a body's axis within which an obstacle is that body."""
 _CLOSE_M = 2.5
 """Distance to which the robot approaches positions where depth may be missing because they are far."""
 _BESIDE_M = 0.5
@@ -133,7 +144,8 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
     def run(self, inputs: FindPeopleInputs) -> Routine[Succeeded]:
         """Searches until enough people were detected twice; from further viewpoints if the robot may move."""
         view, tracker = _View(self.context, inputs, self.options), PeopleTracker(self.options.same_m)
-        self._waited_s = 0.0
+        knows, self._waited_s = PERSON in self.context.detector.class_names, 0.0
+        self._cameras = self.context.robot.capabilities().body_cameras if knows else ()
         found = yield from self._look_round(inputs, tracker, view)
         for _ in range(self.options.viewpoints if inputs.moves else 0):
             if 0 < inputs.count <= len(found) or not view.gap(moves=True) or not (goals := view.goals()):
@@ -149,21 +161,23 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
 
     def _look_round(self, inputs: FindPeopleInputs, tracker: PeopleTracker, view: "_View") -> Routine[list[SeenPerson]]:
         """Looks and turns in place until enough people were detected twice; returns them."""
-        area, same_m = shapely.Polygon(inputs.area_W), self.options.same_m
+        area, message = shapely.Polygon(inputs.area_W), f"looking for people in the {inputs.place}"
         found, sure = list[SeenPerson](), list[SeenPerson]()
         area = area.difference(shapely.MultiPoint([one.position_W[:2] for one in inputs.avoid]).buffer(_AVOID_M))
         for look in range(self.options.looks):
             if look:
                 yield from self._turn()
-            by_lidar = yield from self._in_scan(f"looking for people in the {inputs.place}")
-            by_camera = yield from self._in_pictures(view, f"looking for people in the {inputs.place}")
+            by_lidar = yield from self._in_scan(message, abreast=bool(self._cameras) and not inputs.unpictured)
+            by_camera = yield from self._in_pictures(view, message)
             if by_camera is not None and not by_camera and not inputs.unpictured:
                 raise SkillFailure(Cause.EXECUTION, view.fault)
             tracker.update(by_lidar, by_scan=True, apart_m=SCAN_APART_M)
             for people in by_camera or ():
-                tracker.update(people, by_scan=False, apart_m=same_m)
+                tracker.update(people, by_scan=False, apart_m=SCAN_APART_M)
+            shown = [one.place_W for people in by_camera or () for one in people]
+            tracker.revise(partial(view.note_missed, shown=shown))
             if inputs.unpictured:
-                again = yield from self._in_scan(f"looking for people in the {inputs.place}")
+                again = yield from self._in_scan(message)
                 tracker.update(again, by_scan=True, apart_m=SCAN_APART_M)
             least = 0 if by_camera is None or inputs.unpictured else 1
             sure = [one for one in tracker.people if one.looks >= least and one.looks + one.scans > 1]
@@ -171,8 +185,8 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
             found.sort(key=lambda one: by_camera is not None and one.looks == 0)
             if 0 < inputs.count <= len(found):
                 break
-        unsure = (one for one in tracker.people if one not in sure and area.covers(shapely.Point(one.place_W)))
-        view.end_round(sure, unsure=any(True for _ in unsure))
+        unsure = [one for one in tracker.people if one not in sure and area.covers(shapely.Point(one.place_W))]
+        view.end_round(sure, unsure)
         return found
 
     def _turn(self) -> Routine[None]:
@@ -194,25 +208,25 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
         enough = len(found) >= max(1, inputs.count)
         else_ = " else" if inputs.avoid else ""
         few = count_sentence(found, ()) if found else f"nobody{else_} is seen in the {inputs.place} from here"
+        outputs = {"observation": found[0], "observations": found} if found else {}
         if not (enough and inputs.count) and (gap := view.gap(moves=inputs.moves)):
-            raise SkillFailure(Cause.EXECUTION, f"{few}, {gap}")
+            raise SkillFailure(Cause.EXECUTION, f"{few}, {gap}", outputs)
         if not enough:
             raise SkillFailure(Cause.POSTCONDITION, few)
         who = "somebody" if found[0].kind.name == PERSON else found[0].kind.name
         said = f"saw {who} in the {found[0].surface}" if inputs.count == 1 else count_sentence(found, ())
-        return Succeeded(said, {"observation": found[0], "observations": found})
+        return Succeeded(said, outputs)
 
     def _in_pictures(self, view: "_View", message: str) -> Routine[Sequence[Sequence[SeenPerson]] | None]:
         """Detects people in pictures of the body cameras, and publishes each picture with people, or else the first.
 
         Returns None when the detector has no class of people.
         """
-        robot, detector, options = self.context.robot, self.context.detector, self.options
-        cameras = robot.capabilities().body_cameras
-        if PERSON not in detector.class_names or not cameras:
+        detector, options = self.context.detector, self.options
+        if not self._cameras:
             view.look(None, self.context.localiser.estimate().X_WO)
             return None
-        images, faults = yield from self._pictures(cameras, message)
+        images, faults = yield from self._pictures(message)
         X_WO, here_W = self.context.localiser.estimate().X_WO, self.context.pose()
         view.look(images, X_WO, faults)
         detected = yield from self.compute(
@@ -232,9 +246,7 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
             people.append(located)
         return people
 
-    def _pictures(
-        self, cameras: Sequence[CameraCapabilities], message: str
-    ) -> Routine[tuple[list[Image], Sequence[str]]]:
+    def _pictures(self, message: str) -> Routine[tuple[list[Image], Sequence[str]]]:
         """Takes the pictures in which people can be located; returns also why other cameras gave none.
 
         Tries again while a camera has a fault; one attempt of the skill waits `PATIENCE_S` in total.
@@ -243,7 +255,10 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
         while True:
             begun_s = clock.now()
             taken = yield from self.sense(
-                lambda: pictures_with_depth(robot, clock, cameras), latency_s=0.0, name="pictures", message=message
+                lambda: pictures_with_depth(robot, clock, self._cameras),
+                latency_s=0.0,
+                name="pictures",
+                message=message,
             )
             images = [image for image in taken[0] if not is_dark(image)]
             faults = ["it is too dark to see anybody"] * (len(taken[0]) - len(images)) + taken[1]
@@ -252,7 +267,7 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
             yield from self.pause(_AGAIN_S, f"{faults[0]}; {message}")
             self._waited_s += clock.now() - begun_s
 
-    def _in_scan(self, message: str) -> Routine[Sequence[SeenPerson]]:
+    def _in_scan(self, message: str, *, abreast: bool = False) -> Routine[Sequence[SeenPerson]]:
         """Detects people in the newest scan. Raises SkillFailure when there is no new scan."""
         robot, patience = self.context.robot, Patience(self.context.clock)
         while (scan := robot.scan()) is None or scan.stamp_s < self.context.clock.now() - _SCAN_AGE_S:
@@ -261,7 +276,7 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
             yield Running(f"{message}; waits for a scan")
         X_WB, costmap = self.context.localiser.estimate().X_WO @ scan.X_OB, self.context.costmap
         survey = costmap if isinstance(costmap, SurveyView) else None
-        return people_in_scan(scan, X_WB, robot.capabilities().footprint_m, survey=survey)
+        return people_in_scan(scan, X_WB, robot.capabilities().footprint_m, survey=survey, abreast=abreast)
 
 
 @dataclass(frozen=True)
@@ -293,8 +308,10 @@ class _View:
         self._points: FloatArray = points[free & (away_m > _AVOID_M).all(axis=1)]
         self._count = max(1, int(free.sum()))
         self._views: NDArray[np.int64] = np.zeros(len(self._points), np.int64)
-        self._missed, self._around, self._unsure, self.fault = self._views > 0, self._views > 0, False, ""
+        self._missed, self._around, self.fault = self._views > 0, self._views > 0, ""
         self._unlocated, self._new = list[_Unlocated](), list[_Unlocated]()
+        self._pictures, self._X_WO = list[Image](), RigidTransform()
+        self._unsure, self._doubts = False, list[SeenPerson]()
 
     def gap(self, *, moves: bool) -> str:
         """Why there may be people whom the search missed; empty when it missed nobody."""
@@ -302,6 +319,8 @@ class _View:
             return "but somebody is in a picture that has no depth there"
         if self.fault and (self._unsure or (self._missed & self._hidden()).any()):
             return f"but {self.fault}"
+        if self._doubts:
+            return f"but what stands at {place_text(self._doubts[0].place_W)} may be a person"
         hidden = float(self._hidden().sum()) / self._count
         return f"and {hidden:.0%} of it was never in view" if moves and hidden > self._options.hidden else ""
 
@@ -309,6 +328,7 @@ class _View:
         """Marks the positions that images show from the robot's present pose; all in line of sight without cameras."""
         here = self._context.pose()
         here_W = np.array((here.x_m, here.y_m))
+        self._pictures, self._X_WO = list(images or ()), X_WO
         shown = np.linalg.norm(self._points - here_W, axis=1) < (math.inf if images is None else _BESIDE_M)
         for image in images or ():
             shown |= _may_show(image, X_WO, self._points)
@@ -329,12 +349,31 @@ class _View:
         """Mask of the positions that too few pictures show: none, or fewer than `_VIEWS` where a camera has a fault."""
         return self._views < np.where(self._missed, _VIEWS, 1)
 
-    def end_round(self, people: Sequence[SeenPerson], *, unsure: bool) -> None:
+    def note_missed(self, one: SeenPerson, shown: Sequence[tuple[float, float]]) -> SeenPerson:
+        """Counts a miss when a picture of the last look shows a body whole, and no person there or beside it."""
+        here = self._context.pose()
+        if any(math.dist(one.place_W, each) < _BESIDE_PERSON_M for each in shown):
+            return one  # two people side by side may be one detection
+        whole = [image for image in self._pictures if image.stamp_s > one.picture_s]
+        place_W, here_W = np.array([one.place_W]), np.array([(here.x_m, here.y_m)])
+        whole = [image for image in whole if _may_show(image, self._X_WO, place_W, least=_VISIBLE)[0]]
+        return replace(one, missed=one.missed + 1) if whole and self._shows_body(here_W, one)[0] else one
+
+    def _shows_body(self, points_W: FloatArray, one: SeenPerson) -> NDArray[np.bool_]:
+        """Mask (N,) of the positions (N, 2) from which a picture may show a body whole."""
+        away_m = np.linalg.norm(points_W - one.place_W, axis=1)
+        is_clear = line_of_sight(self._context.costmap, np.array(one.place_W), points_W, beyond_m=_BODY_M)
+        return np.asarray((_WHOLE_M[0] <= away_m) & (away_m <= _WHOLE_M[1]) & is_clear)
+
+    def end_round(self, people: Sequence[SeenPerson], unsure: Sequence[SeenPerson]) -> None:
         """Marks as hidden where people without depth may be, unless they are located by now or a later round looked.
 
-        `unsure`: somebody else may be in the area, whom only scans or a single picture show.
+        `unsure` are those in the area whom only scans or a single picture show. One of them whom a picture or two scans
+        show may be a person, unless `_VIEWS` pictures show that it is none.
         """
-        self._unsure = unsure
+        self._unsure = bool(unsure)
+        seen = (one for one in unsure if one.looks > 0 or one.scans > 1)
+        self._doubts = [one for one in seen if one.missed < _VIEWS and self._pictures]
         hidden, same_m = self._options.hidden, self._options.same_m
         left = [one for one in self._unlocated if (one.at & self._hidden()).sum() > hidden * one.at.sum()]
         self._unlocated, self._new = [one for one in (*left, *self._new) if not one.is_among(people, same_m)], []
@@ -342,10 +381,13 @@ class _View:
             self._views[one.at] = 0
 
     def goals(self) -> list[NavigateInputs]:
-        """Free viewpoints, sorted by the number of hidden positions that they bring into view."""
+        """Free viewpoints, sorted by the number of unsure bodies or hidden positions that they bring into view."""
         here, hidden = self._context.pose(), self._points[self._hidden()]
         reach_m = _CLOSE_M if self._unlocated else self._options.reach_m
         shown = np.array([self._shows(point, hidden, reach_m) for point in self._points], bool)
+        if self._doubts:
+            hidden = np.array([one.place_W for one in self._doubts])
+            shown = np.array([self._shows_body(self._points, one) for one in self._doubts], bool).T
         gains = shown.sum(axis=1)
         drives_m = np.linalg.norm(self._points - (here.x_m, here.y_m), axis=1)
         best = (n for n in np.lexsort((drives_m, -gains)) if gains[n] > 0)
@@ -367,9 +409,16 @@ class _View:
 
 
 def _may_show(
-    image: Image, X_WO: RigidTransform, points_W: FloatArray, box: tuple[float, float, float, float] | None = None
+    image: Image,
+    X_WO: RigidTransform,
+    points_W: FloatArray,
+    box: tuple[float, float, float, float] | None = None,
+    least: float = 0.0,
 ) -> NDArray[np.bool_]:
-    """Mask (N,) of the positions (N, 2) where a picture shows a standing person; with a box, one of its size in it."""
+    """Mask (N,) of the positions (N, 2) where a picture shows a standing person; with a box, one of its size in it.
+
+    `least`: fraction of the person's length that is in the picture.
+    """
     lens, X_CW = image.intrinsics, camera_pose_W(image, X_WO).inverse()
     p_C = np.stack([X_CW.multiply(np.insert(points_W, 2, z_m, axis=1).T).T for z_m in _HEIGHTS_M])
     u, v = project(np.maximum(p_C, [-np.inf, -np.inf, _NEAREST_M]), lens)
@@ -378,4 +427,5 @@ def _may_show(
     long_px = max(u1 - u0, v1 - v0)
     edge_px = _AXIS_ASIDE * long_px if box else 0.0
     inside = (u > u0 - edge_px) & (u < u1 + edge_px) & (v > v0 - edge_px) & (v < v1 + edge_px)
-    return np.asarray((inside & (p_C[..., 2] > _NEAREST_M)).any(axis=0) & (long_px > _VISIBLE * whole_px))
+    in_view = (whole_px >= least * np.hypot(np.ptp(u, axis=0), np.ptp(v, axis=0))) & (long_px > _VISIBLE * whole_px)
+    return np.asarray((inside & (p_C[..., 2] > _NEAREST_M)).any(axis=0) & in_view)

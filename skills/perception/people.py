@@ -37,6 +37,9 @@ _BODY_WIDTH_M = (0.12, 0.9)
 _BODY_TOP_M = 0.95
 _BODY_TALL_M = 0.25
 _BODY_FEWEST_POINTS = 8
+_SHOULDERS_M = 0.6
+"""Greatest width of one of several people side by side."""
+_MOST_ABREAST = 3
 _COLUMNS = 450
 _FRONT_TO_AXIS_M = 0.1
 _AXIS_SIGMA_M = 0.08
@@ -85,12 +88,17 @@ def people_in_scan(
     survey: SurveyView | None = None,
     *,
     ahead_m: float = ARM_AHEAD_M,
+    abreast: bool = False,
 ) -> list[SeenPerson]:
-    """Detects people in a LiDAR scan, nearest first; ignores points inside and just outside the robot's footprint."""
+    """Detects people in a LiDAR scan, nearest first; ignores points inside and just outside the robot's footprint.
+
+    With `abreast`, returns that are too wide for one person are several people side by side.
+    """
     corners = np.array(footprint_m)
     own_m = np.array([corners.min(axis=0) - (_OWN_M[0], _OWN_M[1]), corners.max(axis=0) + (ahead_m, _OWN_M[1])])
     if survey is not None and len(scan.elevations_rad) > 1:
         clusters = _unexplained_clusters(scan, X_WB, own_m, furthest_m, survey)
+        clusters = [one for each in clusters for one in (_abreast(each) if abreast else (each,))]
         people = [_person(scan.stamp_s, X_WB, cluster) for cluster in clusters if _is_body_sized(cluster)]
     else:
         people = _lone_people(scan, X_WB, own_m, furthest_m)
@@ -151,6 +159,18 @@ def _is_body_sized(points: FloatArray) -> bool:
     width, tall = float(np.hypot(*np.ptp(points[:, :2], axis=0))), float(np.ptp(points[:, 2]))
     sized = _BODY_WIDTH_M[0] < width < _BODY_WIDTH_M[1] and tall > _BODY_TALL_M
     return len(points) >= _BODY_FEWEST_POINTS and sized and float(points[:, 2].max()) > _BODY_TOP_M
+
+
+def _abreast(points: FloatArray) -> list[FloatArray]:
+    """Splits returns that are too wide for one person into equally wide ones, along their length."""
+    off = points[:, :2] - points[:, :2].mean(axis=0)
+    along = off @ np.linalg.svd(off, full_matrices=False)[2][0]
+    width = float(np.ptp(along))
+    count = math.ceil(width / _SHOULDERS_M) if width > _BODY_WIDTH_M[1] else 1
+    if not 1 < count <= _MOST_ABREAST:
+        return [points]
+    numbers = np.minimum((along - along.min()) * count // width, count - 1)
+    return [points[numbers == number] for number in range(count)]
 
 
 def _is_leg_sized(points_B: FloatArray) -> bool:

@@ -567,6 +567,53 @@ def test_an_answer_about_people_is_judged_by_where_they_stand(room, person, coun
         assert (verdict.success, told in verdict.why) == (right, True)
 
 
+# answer to how many, at least so many -> right where one person stands in the kitchen
+@pytest.mark.parametrize(
+    ("answer", "at_least", "right"),
+    [(1, False, True), (0, False, False), (2, False, False), (1, True, True), (0, True, True), (2, True, False)],
+)
+def test_the_referee_judges_the_number_of_a_count(answer, at_least, right):
+    asked = GoalCondition(GoalKind.ANSWERED, ("person",), 0, (ROOM,), answer=answer, at_least=at_least)
+    verdict = Stage().watch().referee.judge([asked])
+    assert verdict.success is right
+    assert verdict.why == f"The answer was {'at least ' * at_least}{answer}, and robin is in the kitchen."
+
+
+# objects on the table and on the floor below -> numbers that are right
+@pytest.mark.parametrize(("source", "maybe", "right"), [((TABLE,), (), {1}), ((SHELF,), (TABLE,), {0, 1})])
+def test_the_referee_judges_the_number_of_objects(source, maybe, right):
+    asked = GoalCondition(GoalKind.ANSWERED, ("coke",), 0, source, maybe=maybe)
+    answers = [replace(asked, answer=number) for number in range(3)]
+    assert {number for number, holds in enumerate(Stage().results(*answers)) if holds} == right
+
+
+LEFT_AT_10_S = TimedPath(np.array([[0.0, 3.0, 0.0, 0.0], [4.0, 4.0, 0.0, 10.0]]))
+"""A person who is in the kitchen for 10 s, and then in the hall."""
+
+
+# begin and end of the look at the kitchen (s) -> answers that are right, given at 30 s
+@pytest.mark.parametrize(
+    ("looked_s", "right"),
+    [((2.0, 8.0), {"1", "True"}), ((12.0, 20.0), {"0", "False"}), ((8.0, 12.0), {"0", "1", "False", "True"})],
+)
+def test_the_referee_judges_an_answer_by_the_looks_that_it_rests_on(looked_s, right):
+    truth = Truth(40.0, (), {}, {"robin": LEFT_AT_10_S}, {})
+    looks = (("the kitchen", *looked_s), ("the hall", 25.0, 29.0))
+    asked = GoalCondition(GoalKind.ANSWERED, ("person",), source=(ROOM,), answered_s=30.0, looked_s=looks)
+    answers = (0, 1, 2, False, True)
+    assert {
+        str(each) for each in answers if judge([replace(asked, answer=each)], truth, collisions=()).success
+    } == right
+
+
+def test_a_person_who_walks_from_one_look_to_the_next_is_one_person():
+    truth = Truth(40.0, (), {}, {"robin": LEFT_AT_10_S}, {})
+    looks = (("the kitchen", 0.0, 5.0), ("the hall", 15.0, 20.0))
+    asked = GoalCondition(GoalKind.ANSWERED, ("person",), 0, (ROOM, OTHER), answered_s=30.0, looked_s=looks)
+    right = [judge([replace(asked, answer=each)], truth, collisions=()).success for each in (0, 1, 2)]
+    assert right == [False, True, False]
+
+
 DOORWAY = square("door between hall and kitchen", 2.5, 0.0, half=0.3)
 OPENS_AND_CLOSES = ((0.0, 1.0), (10.0, 0.5), (12.0, 0.0), (20.0, 0.5), (22.0, 1.0))
 

@@ -333,6 +333,7 @@ def _answer(finding: Finding, parts: Sequence[StepPart], artifacts: Artifacts) -
         t_s=finding.t_s,
         place=next((command.goal for command in commands if command is not None), None),
         picture=artifacts.numbers.get((path_id, finding.t_s)),
+        at_least=finding.at_least,
     )
 
 

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 class ReportedAnswer:
     """Answer to a question in the mission, with its time (s) and the place that the command names, if any.
 
-    `picture` is the index of the answer's picture in the run; None if there is no picture.
+    A count is a number; with `at_least`, there may be more. `picture` is the index of the answer's picture in the run;
+    None if there is no picture.
     """
 
     question: str
@@ -36,6 +37,7 @@ class ReportedAnswer:
     t_s: float
     place: str | None = None
     picture: int | None = None
+    at_least: bool = False
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from executive.run.mission_history import is_speech
+from executive.run.mission_history import is_speech, looks_of
 from executive.run.outcome import Execution, Outcome, RobotResult
 from executive.tree.board import FromBoard
 from executive.tree.compiler import CompiledTree
@@ -119,16 +119,25 @@ def _conditions_of_share(share: Share, moves: Sequence[_Move], *, last: bool) ->
 def _answers(
     part: StepPart, condition: GoalCondition, result: RobotResult, executions: Sequence[Execution]
 ) -> Iterator[GoalCondition]:
-    """Yields a condition for each yes or no that a check answered, even if the step around the check failed later.
+    """Yields a condition for each answer that a check gave, even if the step around the check failed later.
 
-    The answer is on what the last picture of its step showed; on a door, on the time at which it was given.
+    The answer is on what its looks showed; on a door, on the time at which it was given.
     """
     below = f"{part.path_id}/"
-    answers = [one for one in result.findings if f"{one.path_id}/".startswith(below) and isinstance(one.answer, bool)]
-    for one in answers:
+    told = [(one, one.answer) for one in result.findings if f"{one.path_id}/".startswith(below)]
+    answers = [(one, answer) for one, answer in told if isinstance(answer, int)]
+    looks = {node.path_id: looks_of(node) for node in result.tree.root.walk()}
+    for one, answer in answers:
         begun_s = max((each.began_s for each in executions if each.began_s <= one.t_s), default=one.t_s)
-        seen = condition.kind is GoalKind.ANSWERED and one.seen_s is not None and one.seen_s >= begun_s
-        yield replace(condition, answer=bool(one.answer), answered_s=one.seen_s if seen else one.t_s)
+        took = [each for each in result.executions if begun_s <= each.began_s <= one.t_s]
+        looked_s = tuple(
+            (name, each.began_s, min(_end(each), one.t_s))
+            for name, leaves in looks.get(one.path_id, {}).items()
+            for each in took
+            if each.path_id in leaves
+        )
+        given = replace(condition, answer=answer, at_least=one.at_least)
+        yield replace(given, answered_s=one.t_s, looked_s=looked_s)
     if not answers and any(one.done for one in executions):
         yield condition
 

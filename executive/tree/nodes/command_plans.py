@@ -1,6 +1,5 @@
 """Plans of commands: grasp, find, carry, go, wait, charge, people; and of pairs of commands with trips or rounds."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Final
 
@@ -39,8 +38,6 @@ MAX_TRIPS: Final = 20
 
 COUNTED: Final = Annotated[float, Quantity(ge=0.0, le=1_000.0)]
 """Number of objects that a look counts."""
-_ANSWERS: Final[Mapping[str, tuple[str, type]]] = {"answer": ("key", bool), "count": ("count_key", float)}
-"""Results of a status check by name: the answer node's option with the key, and the type."""
 
 
 def _plan(assembler: Assembler, step: Do | Say, builder: PlanBuilder) -> Assembled:
@@ -104,8 +101,8 @@ def _giving(assembler: Assembler, step: Do | Say, node: NodeSpec, builder: PlanB
             said = listing(known) if command.looks else "no answer"
             hint = "write {answer: NAME} beside a question, or {count: NAME} beside one that counts"
             raise InputError.at(step.source, f"this step gives {said}, not '{port}'", hint=hint)
-        option, kind = _ANSWERS[port]
-        keys[option] = assembler.give(name, builder.key(port), kind, builder, COUNTED if port == "count" else None)
+        kind, span = (float, COUNTED) if port == "count" or command.object_count == 0 else (bool, None)
+        keys["count_key" if port == "count" else "key"] = assembler.give(name, builder.key(port), kind, builder, span)
     return set_answer_options(node, keys) if keys else node
 
 

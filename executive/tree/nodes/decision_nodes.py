@@ -273,7 +273,11 @@ class Decide(MemoryComposite):
         if holds is None:
             return False
         self.context.board.put(self.key, holds)
-        self._end(None, f"{'yes' if holds else 'no'}: {self.words}")
+        is_denied = isinstance(self.decision.condition, Not) and isinstance(self.decision.condition.part, Look)
+        told = [
+            message_of(one).split(": ", 1)[-1] for one in self.children if is_denied and one.status == Status.SUCCESS
+        ]
+        self._end(None, f"{'yes' if holds else 'no'}: {next(iter(told), self.words)}")
         return True
 
 

@@ -49,7 +49,7 @@ _UNEXPLAINED: Final = "unexplained"
 
 
 class Answer(ExplainedDecorator):
-    """Decorator that turns the result of a search into the answer yes or no.
+    """Decorator that turns the result of a search into the answer yes or no, or a number.
 
     | child | surfaces | status |
     |---|---|---|
@@ -60,6 +60,7 @@ class Answer(ExplainedDecorator):
     | with `tallies`: ended, `needed` objects counted | any | SUCCESS, answer True |
     | with `tallies`: ended, fewer counted | all seen | SUCCESS, answer False |
     | with `tallies`: ended, fewer counted | some not seen | FAILURE with the cause that prevented the look |
+    | with `numeric`: like `tallies` | any | the number instead of True or False, "at least" if some is not seen |
     | halted | any | INVALID with CANCELLED |
 
     `looks` has the leaves for each surface, one for each viewpoint; a surface is seen when each leaf succeeded or
@@ -67,7 +68,8 @@ class Answer(ExplainedDecorator):
     and it names objects that no look recognised, which the leaves write under the keys `doubts`.
     `question` is the text for yes, `denied` the text for no; without `yes_or_no` the text stands alone, because "is it
     empty" and "is there anything on it" are one question. The leaves write all found objects under the blackboard keys
-    `tallies`. Each object counts once; the number is written under `count_key`, if given.
+    `tallies`, also when they fail. Each object counts once; the number is written under `count_key`, if given. The
+    answer is `numeric` where that is asked for; `related` says which objects are counted.
     """
 
     kind = "answer"
@@ -85,9 +87,11 @@ class Answer(ExplainedDecorator):
     needed: int = 1
     yes_or_no: bool = True
     count_key: str = ""
-    answer: bool | None = field(default=None, init=False)
+    numeric: bool = False
+    related: str = ""
+    answer: int | None = field(default=None, init=False)
 
-    def answered(self) -> bool | None:
+    def answered(self) -> int | None:
         """Returns the answer."""
         return self.answer
 
@@ -97,8 +101,9 @@ class Answer(ExplainedDecorator):
         self.answer = self.board.get(self.key) if status == Status.SUCCESS else None
 
     def initialise(self) -> None:
-        """Clears the answer of an earlier run."""
+        """Clears the answer of an earlier run, and what its looks found."""
         self.answer = None
+        self.board.forget(self.tallies.values())
 
     def update(self) -> Status:
         """Answers once the search has ended."""
@@ -116,35 +121,34 @@ class Answer(ExplainedDecorator):
 
     def _counted(self, nodes: Mapping[str, Explained], unseen: Sequence[str]) -> Status:
         done = {leaf for leaf, node in nodes.items() if node.status == Status.SUCCESS}
-        found, unknown = (
-            distinct_objects([self.board.get(key) for leaf, key in keys.items() if leaf in done])
-            for keys in (self.tallies, self.doubts)
-        )
+        found = distinct_objects(self.board.get(key, ()) for key in self.tallies.values())
+        unknown = distinct_objects(self.board.get(key) for leaf, key in self.doubts.items() if leaf in done)
         unknown = tuple(u for u in unknown if all(math.dist(u.position_W, f.position_W) > SAME_WITHIN_M for f in found))
-        enough = len(found) >= self.needed
+        enough, is_least = len(found) >= self.needed, bool(unseen or unknown)
         if self.count_key:
             self.board.put(self.count_key, float(len(found)))
-        if not enough and (unseen or unknown):
+        if not enough and is_least:
             unsure = (f"{one.surface}" for one in unknown if one.surface not in unseen)
             return self._not_looked(nodes, (*unseen, *dict.fromkeys(unsure)))
-        limits = f", as far as was seen: not {', '.join(unseen)}" if unseen else ""
+        limits = f"; not all was seen in: {', '.join(unseen)}" if unseen else ""
         limits += f"; besides, {listing(map(describe_unknown, unknown))}" if unknown else ""
-        return self._answered(enough, f"{count_sentence(found, ())}{limits}" if found else "")
+        told = f"{count_sentence(found, (), at_least=is_least)}{self.related}{limits}" if found else ""
+        return self._answered(len(found) if self.numeric else enough, told, is_least and self.numeric)
 
     def _not_looked(self, nodes: Mapping[str, Explained], unseen: Sequence[str]) -> Status:
         causes = (node.cause for node in nodes.values() if node.cause is not Cause.POSTCONDITION)
         cause = next(filter(None, causes), Cause.EXECUTION)
         return self.fail(Failed(cause, f"no answer for {', '.join(unseen)}: {self.message}"))
 
-    def _answered(self, answer: bool, found: str) -> Status:
+    def _answered(self, answer: int, found: str, is_least: bool = False) -> Status:
         self.answer, self.cause = answer, None
         text = self.question if answer else self.denied
         if self.yes_or_no:
             text = f"{'yes' if answer else 'no'}: {text}"
-        self.message = text + (f"; {found}" if found else "")
-        self.board.put(self.key, answer)
+        self.message = found if found and self.numeric else "; ".join(filter(None, (text, found)))
+        self.board.put(self.key, float(answer) if self.numeric else answer)
         note = {"node": self.path_id, "question": self.question, "answer": answer, "message": self.message}
-        self.publish(ANSWER_TOPIC, note)
+        self.publish(ANSWER_TOPIC, note | ({"at_least": True} if is_least else {}))
         return Status.SUCCESS
 
 
@@ -197,6 +201,7 @@ def people_looks(
 ) -> tuple[tuple[str, NodeSpec], ...]:
     """Builds a drive and a look around for each room of the search for a person; see `look_plans`.
 
+    Where somebody blocks the drive into a room, the robot looks from where it stands, and says what it has not seen.
     Raises InputError for a surface as the place, and for a named person among several, who all look alike to the robot.
     """
     knowledge = builder.knowledge
@@ -212,7 +217,9 @@ def people_looks(
         ports = {"area_W": area_W, "place": room, "person": person, "count": count, **moves}
         tally = {_TALLY: below.key("all")} if tallied else {}
         look = below.skill("find_people", ports, {"observation": key, **tally})
-        plans.append((room, below.sequence(f"look about the {room}", go_into_plan(below, room), look)))
+        go = go_into_plan(below, room)
+        go = below.or_stay(f"go into the {room}, if possible", go, "it looks from here", part="go") if moves else go
+        plans.append((room, below.sequence(f"look about the {room}", go, look)))
     return tuple(plans)
 
 
@@ -366,7 +373,7 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
     """
     command, knowledge = builder.command, builder.knowledge
     place = None if command.goal is None else builder.place(command.goal)
-    counting, key = command.object_count != 1, builder.key("detection")
+    counting, key, related = command.object_count != 1, builder.key("detection"), ""
     person = None if command.object is None else knowledge.somebody(command.object.name)
     if person is not None:
         what = "somebody" if person == ANYBODY else person
@@ -384,16 +391,12 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
     below = builder.at("search")
     title = f"look for {what if what == ANYTHING else asked}"
     search = below.node("round" if counting else "selector", title, *(look for _, look in looks))
+    leaves = {s: tuple(look.children[-1].path_id for name, look in looks if name == s) for s, _ in looks}
+    outputs = {leaf.path_id: leaf.options["outputs"] for _, look in looks for leaf in look.children[1:] if counting}
     tallies, doubts = (
-        {
-            leaf.path_id: leaf.options["outputs"][port]
-            for _, look in looks
-            for leaf in look.children[1:]
-            if counting and port in leaf.options["outputs"]
-        }
-        for port in (_TALLY, _UNEXPLAINED)
+        {p: keys[port] for p, keys in outputs.items() if port in keys} for port in (_TALLY, _UNEXPLAINED)
     )
-    spot = place_phrase(knowledge, place)
+    spot, counts = place_phrase(knowledge, place), answer_key is None and command.object_count == 0
     denied = f"{'not' if command.object_count > 1 or person in knowledge.people else 'no'} {absent} {spot}"
     if what == ANYTHING:
         asked, denied = "something", f"nothing {spot}"
@@ -412,7 +415,9 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
         tallies=MappingProxyType(tallies),
         doubts=MappingProxyType(doubts),
         needed=max(1, command.object_count),
-        yes_or_no=what != ANYTHING,
+        yes_or_no=what != ANYTHING and not counts,
+        numeric=counts,
+        related=related,
     )
     return builder.at("tidy").stow_after(answer)
 

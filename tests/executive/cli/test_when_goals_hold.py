@@ -75,6 +75,18 @@ def test_each_check_of_a_condition_is_judged_at_its_time(ran):
     assert looks[0].answered_s < looks[1].answered_s
 
 
+# seen on -> what the robot says to "is no coke in the kitchen", and its answers to the look and the question
+@pytest.mark.parametrize(
+    ("seen_on", "says", "answers"),
+    [((), "yes: no coke in the kitchen", [False, True]), (("shelf",), "no: a coke in the kitchen", [True, False])],
+)
+def test_a_denied_question_is_answered_by_the_opposite_of_its_look(ran, script, seen_on, says, answers):
+    script.seen_on = seen_on
+    tree, result = ran(Check(condition=Not(part=LOOK)))
+    assert (result.message, [one.answer for one in result.findings]) == (says, answers)
+    assert [one.answer for one in conditions_of(tree, result)] == answers[:1]
+
+
 @pytest.fixture
 def looks_at_door(knowledge, registry, script, monkeypatch):
     """Adds a door between hall and kitchen; scripted looks answer whether it is open, by the number of the look."""

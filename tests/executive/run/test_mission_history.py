@@ -51,13 +51,10 @@ def test_any_node_adds_a_finding_by_publishing_an_answer(findings, answer):
     assert (one.answer, one.sentence, one.question) == (answer, "Robin says so", "q")
 
 
-def test_an_answer_has_the_time_of_the_last_picture_before_it(findings, clock):
-    findings.message("answer", answered("alice/patrol/1", False, "nobody"))
-    for stamp_s in (3.0, 4.5):
-        findings.message("detections", {"stamp_s": stamp_s, "detections": []})
-    clock.advance(6.0)
-    findings.message("answer", answered("alice/patrol/2", False, "nobody"))
-    assert [one.seen_s for one in findings.findings] == [None, 4.5]
+@pytest.mark.parametrize("at_least", [True, False])
+def test_a_finding_says_whether_a_count_is_the_least_number(findings, at_least):
+    findings.message("answer", {**answered("alice/patrol/1", 2, "at least two"), "at_least": at_least})
+    assert [(one.answer, one.at_least) for one in findings.findings] == [(2, at_least)]
 
 
 def test_speech_is_stored(findings, clock):
@@ -170,10 +167,13 @@ def test_a_claim_sums_the_mission_up_and_does_not_repeat_its_last_step(reached, 
 
 def test_a_decision_does_not_say_again_what_its_only_look_has_found():
     look = Finding("alice/p/1/check/look-1", 5.0, "somebody in the office", False, "no: nobody in the office")
-    one = Finding("alice/p/1", 5.0, "no person at office", True, "yes: no person at office")
+    one = Finding("alice/p/1", 5.0, "person at office", False, "no: person at office")
+    denied = replace(one, question="no person at office", answer=True, sentence="yes: nobody in the office")
     both = replace(one, question="no person at office and battery over 50 %", sentence="yes: it is")
     assert claim("", [look, one]) == "no: nobody in the office"
-    assert claim("", [look, replace(one, t_s=9.0)]) == "nobody in the office; yes: no person at office"
+    assert claim("", [look, denied]) == "yes: nobody in the office"
+    later = replace(one, t_s=9.0)  # by the answer of an earlier look
+    assert claim("", [look, one, later]) == "nobody in the office; no: person at office"
     assert claim("", [look, both]) == "nobody in the office; yes: it is"
 
 

@@ -153,7 +153,8 @@ def test_a_status_check_names_every_look(compiled):
         ("Nothing", "person", {"bedroom"}, True, 2, "yes: somebody; saw them in the bedroom"),
         ("Nothing", "Robin", {"hall"}, True, 1, "yes: Robin; saw them in the hall"),
         ("Nothing", "Robin", set(), False, 4, "no: not Robin anywhere"),
-        ("Nothing", "some person", {"hall", "kitchen"}, True, 4, "yes: people; there are two people in the"),
+        ("Nothing", "some person", {"hall", "kitchen"}, 2, 4, "there are two people in the"),
+        ("kitchen", "some person", set(), 0, 1, "no people in the kitchen"),
         ("kitchen", "2 person", {"kitchen"}, False, 1, "no: not two people in the kitchen; there is one person in the"),
     ],
 )
@@ -179,13 +180,36 @@ def test_people_are_looked_for_in_rooms(
     assert script.begun.count("find_people") == looks
 
 
+# how many the look found before it failed -> the answer, or none
+@pytest.mark.parametrize(("found", "answers"), [(2, [2]), (0, [])])
+def test_a_count_of_people_in_a_room_that_was_not_seen_whole_is_the_least_number(
+    compiled, run_tree, script, found, answers
+):
+    kind = ObjectKind("person")
+    seen = [ObjectObservation(0.0, kind, (x, 0.0, 1.0), (0.5, 0.5, 1.7), 0.0, 0.9, "kitchen") for x in range(found)]
+    outputs = {"observation": seen[0], "observations": tuple(seen)} if seen else {}
+    script.ends["find_people"] = lambda skill: Failed(Cause.EXECUTION, "one may be hidden", outputs)
+    robot = run_tree(compiled("Take [Nothing] to [kitchen] and do [find] to [some person]")).worst
+    assert list(robot.answers.values()) == answers
+    told = "there are at least two people in the kitchen; not all was seen in: kitchen"
+    assert [(one.answer, one.at_least, one.sentence) for one in robot.findings] == [
+        (each, True, told) for each in answers
+    ]
+
+
+def test_people_are_looked_for_from_the_door_when_somebody_blocks_it(compiled, run_tree, script):
+    script.ends["navigate"] = lambda skill: Failed(Cause.PLANNING, "a person blocks the path")
+    run_tree(compiled("Take [Nothing] to [kitchen] and do [find] to [person]"))
+    assert script.begun.count("find_people") == 1
+
+
 @pytest.mark.parametrize(
     ("asked", "seen_on", "answer", "told"),
     [
-        ("some coke", ("counter", "shelf"), True, "yes: cokes in the kitchen; there are two cokes on the counter and"),
+        ("some coke", ("counter", "shelf"), 2, "there are two cokes on the counter and"),
         ("2 coke", ("counter", "shelf"), True, "yes: two cokes in the kitchen; there are two cokes"),
         ("2 coke", ("shelf",), False, "no: not two cokes in the kitchen; there is one coke on the shelf"),
-        ("some coke", (), False, "no: no cokes in the kitchen"),
+        ("some coke", (), 0, "no cokes in the kitchen"),
     ],
 )
 def test_objects_are_counted_on_all_surfaces_of_a_place(compiled, run_tree, script, asked, seen_on, answer, told):

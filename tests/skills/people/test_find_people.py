@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ from planar_people import PeopleDetector, person_at
 from planar_robot import LENS, TWO_ROOMS, Bench, Box
 
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Succeeded
-from skills.people.find_people import FindPeople, FindPeopleInputs
+from skills.people import find_people
+from skills.people.find_people import FindPeople, FindPeopleInputs, FindPeopleOptions
 from skills.robot import Pose2D
 
 ROOM = tuple((x, y) for x, y in ((0.2, 0.2), (4.8, 0.2), (4.8, 3.8), (0.2, 3.8)))
@@ -35,7 +37,7 @@ def lit_bench(monkeypatch, person):
     """Bench with cameras, whose pictures are not dark."""
     bench = bench_in_room(person, cameras=True)
     take = bench.robot.image
-    lit = lambda source: replace(take(source), grey=np.full((LENS.height, LENS.width), 120, np.uint8))  # noqa: E731
+    lit = lambda source, **how: replace(take(source, **how), grey=np.full((LENS.height, LENS.width), 120, np.uint8))  # noqa: E731
     monkeypatch.setattr(bench.robot, "image", lit)
     return bench
 
@@ -76,10 +78,85 @@ def test_a_body_that_no_picture_shows_counts_only_where_that_is_asked_for(unpict
     assert isinstance(step, kind), step
 
 
+class NearSightless(PeopleDetector):
+    """Sees nobody within 1.7 m, as a detector to which the pictures show only legs."""
+
+    def _seen(self, person):
+        here, (x_m, y_m) = self.bench.robot.pose, ((person.x0 + person.x1) / 2, (person.y0 + person.y1) / 2)
+        return super()._seen(person) if math.hypot(x_m - here.x_m, y_m - here.y_m) > 1.7 else None
+
+
+def bench_with(monkeypatch, *people):
+    """Bench with lit cameras, and these people in the room."""
+    bench = lit_bench(monkeypatch, people[0])
+    bench.robot.blocks += [one for one in people if one not in bench.robot.blocks]
+    return bench
+
+
+CLOSE = person_at(2.6, 2.5), person_at(2.6, 1.5)
+"""Two people 1.2 m from the robot."""
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_bodies_that_pictures_do_not_show_whole_forbid_nobody(count, monkeypatch):
+    bench = bench_with(monkeypatch, *CLOSE)
+    step = ended(bench, NearSightless(bench, [*CLOSE]), count=count)
+    assert step.cause is Cause.EXECUTION
+    assert "nobody is seen in the room from here, but what stands at (2." in step.message
+
+
+@pytest.mark.parametrize(("count", "found"), [(0, 2), (2, 2)])
+def test_a_robot_that_may_move_counts_people_who_were_too_near_for_its_pictures(count, found, monkeypatch):
+    bench = bench_with(monkeypatch, *CLOSE)
+    monkeypatch.setattr(FindPeople, "Options", partial(FindPeopleOptions, hidden=1.0))  # it looks for nobody else
+    step = ended(bench, NearSightless(bench, [*CLOSE]), count=count, moves=True)
+    assert isinstance(step, Succeeded), step
+    assert len(step.outputs["observations"]) == found
+
+
+def test_the_people_found_so_far_are_given_where_another_may_stand(monkeypatch):
+    near, far = person_at(2.6, 2.5), person_at(4.0, 1.4)
+    bench = bench_with(monkeypatch, near, far)
+    step = ended(bench, NearSightless(bench, [near, far]), count=0)
+    assert step.cause is Cause.EXECUTION
+    assert step.message.startswith("there is one person in the room, but what stands at (2.")
+    assert len(step.outputs["observations"]) == 1
+
+
+def test_pictures_that_show_a_body_whole_and_nobody_there_show_that_it_is_no_person(monkeypatch):
+    monkeypatch.setattr(find_people, "_VISIBLE", 0.2)  # at 2 m the bench's cameras show a quarter of a person
+    bench = lit_bench(monkeypatch, person_at(3.7, 2.0))
+    step = ended(bench, PeopleDetector(bench, []), moves=True)
+    assert (step.cause, step.message) == (Cause.POSTCONDITION, "nobody is seen in the room from here")
+
+
+def test_people_who_touch_are_at_least_one(monkeypatch):
+    # a detector often shows two people who touch as one; scans show that there is room for two
+    people = person_at(3.5, 1.75), person_at(3.5, 2.25)
+    bench = bench_with(monkeypatch, *people)
+    step = ended(bench, PeopleDetector(bench, [people[0]]), count=0)
+    assert step.cause is Cause.EXECUTION
+    assert step.message.startswith("there is one person in the room, but what stands at (3.")
+    assert len(step.outputs["observations"]) == 1
+
+
+@pytest.mark.parametrize("apart_m", [0.6, 0.8])
+def test_people_side_by_side_are_counted_one_by_one(apart_m, monkeypatch):
+    people = person_at(3.5, 2.0 - apart_m / 2), person_at(3.5, 2.0 + apart_m / 2)
+    bench = bench_with(monkeypatch, *people)
+    step = ended(bench, PeopleDetector(bench, [*people]), count=0)
+    assert isinstance(step, Succeeded), step
+    assert len(step.outputs["observations"]) == 2
+
+
 def spoil(bench, monkeypatch, change, sources=("frontleft", "frontright"), while_=lambda: True):
     """Changes the pictures of some cameras while a condition holds."""
     take = bench.robot.image
-    spoiled = lambda source: change(take(source)) if source in sources and while_() else take(source)  # noqa: E731
+
+    def spoiled(source, **how):
+        image = take(source, **how)
+        return change(image) if source in sources and while_() else image
+
     monkeypatch.setattr(bench.robot, "image", spoiled)
 
 

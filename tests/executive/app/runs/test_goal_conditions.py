@@ -128,20 +128,22 @@ def test_each_round_that_ended_well_is_judged_when_a_later_one_fails(conditions_
     assert [one.when for one in rounds] == [When.END_OF_STEP, When.END_OF_STEP]
 
 
-# time of the last picture after the step began, None: there was none -> time at which the answer is judged
-@pytest.mark.parametrize("seen_after_s", [0.0, None])
-def test_an_answer_is_judged_at_the_last_picture_of_its_step(knowledge, registry, run_tree, seen_after_s):
+@pytest.mark.parametrize("object_", ["coke", "some coke"])
+def test_an_answer_is_judged_by_the_looks_that_it_rests_on(conditions_by, script, object_):
+    script.seen_on = ()
+    (asked,) = conditions_by(step(f"Take [Nothing] to [kitchen] and do [find] to [{object_}]"))
+    assert asked.answer == (False if object_ == "coke" else 0)
+    assert [name for name, _, _ in asked.looked_s] == ["counter", "counter", "shelf"]
+    times = [time_s for _, *span_s in asked.looked_s for time_s in span_s]
+    assert times == sorted(times)
+    assert times[-1] <= asked.answered_s
+
+
+def test_in_a_loop_each_answer_is_judged_by_the_looks_of_its_round(conditions_by):
     find = step("Take [Nothing] to [kitchen] and do [find] to [coke]")
-    mission = Mission(name="m", robot="Alice", steps=(step(GO), find))
-    tree = compile_mission(mission, knowledge=knowledge, registry=registry)
-    result = run_tree(tree).robots[0]
-    begun_s = max(one.began_s for one in result.executions)
-    (answer,) = result.findings
-    seen_s = begun_s - 1.0 if seen_after_s is None else begun_s + seen_after_s
-    seen = replace(result, findings=(replace(answer, seen_s=seen_s),))
-    condition = conditions_of(tree, seen)[-1]
-    assert answer.t_s > begun_s
-    assert condition.answered_s == (answer.t_s if seen_after_s is None else seen_s)
+    first, second = conditions_by(Repeat(loop=Loop(times=2), steps=(find,)))
+    assert len(first.looked_s) == len(second.looked_s) == 1
+    assert first.answered_s <= second.looked_s[0][1]
 
 
 @pytest.fixture

@@ -1,5 +1,7 @@
 """Status checks: yes, an honest no, and no answer when something was not looked at."""
 
+from functools import partial
+
 import pytest
 
 from executive.tree.nodes.composites import MemoryRound, MemorySelector
@@ -10,18 +12,9 @@ from tests.executive.tree.scripted import CAUSES, F, Leaf, S
 
 def asked(context, search, looks, question, **more):
     """An answer after its search."""
-    root = Answer(
-        path_id="alice/q",
-        name="q",
-        child=search,
-        question=question,
-        denied=question,
-        looks=looks,
-        key="alice/q/answer",
-        board=context.board,
-        publish=context.publish,
-        **more,
-    )
+    told = {"question": question, "denied": question, **more}
+    services = {"board": context.board, "publish": context.publish}
+    root = Answer(path_id="alice/q", name="q", child=search, looks=looks, key="alice/q/answer", **services, **told)
     root.tick_once()
     return root
 
@@ -71,9 +64,9 @@ def count_of(context, seen, needed, **more):
     """Asked for beers after a look at each surface, which failed (its letter) or saw beers at these places (m)."""
     looks = []
     for name, found in zip(("bench", "trolley"), seen, strict=True):
-        looks.append(Leaf(found if isinstance(found, str) else "S", f"q/{name}"))
-        if not isinstance(found, str):
-            context.board.put(f"alice/q/{name}/all", tuple(beer(x_m, name) for x_m in found))
+        letter, beers = (found, ()) if isinstance(found, str) else ("S", tuple(beer(x_m, name) for x_m in found))
+        put = partial(context.board.put, f"alice/q/{name}/all", beers)
+        looks.append(Leaf(letter, f"q/{name}", put=put))
     search = MemoryRound(path_id="alice/q/search", name="search", children=looks)
     names = {look.name[2:]: [look.path_id] for look in looks}
     tallies = {look.path_id: f"{look.path_id}/all" for look in looks}
@@ -88,7 +81,7 @@ def count_of(context, seen, needed, **more):
         ((0.0,), (2.0,), 2, True, "; there are two beers on the bench and the trolley"),
         ((0.0,), "O", 2, False, "; there is one beer on the bench"),
         ("O", "O", 1, False, ""),
-        ((0.0,), "P", 1, True, "; there is one beer on the bench, as far as was seen: not trolley"),
+        ((0.0,), "P", 1, True, "; there is at least one beer on the bench; not all was seen in: trolley"),
     ],
 )
 def test_objects_are_counted_over_all_surfaces(context, bench, trolley, needed, answer, told):
@@ -97,12 +90,30 @@ def test_objects_are_counted_over_all_surfaces(context, bench, trolley, needed, 
     assert root.message == f"{'yes' if answer else 'no'}: beers in the workshop{told}"
 
 
+# surfaces with the places of beers (m), or the letter of a failed look -> answer, at least so many, sentence
+@pytest.mark.parametrize(
+    ("seen", "answer", "at_least", "told"),
+    [
+        (((0.0, 1.0), (2.0,)), 3, False, "there are three beers on the bench and the trolley next to the coke"),
+        (((0.0, 1.0), "P"), 2, True, "there are at least two beers on the bench next to the coke; not all was seen in"),
+        (("O", "O"), 0, False, "no beers"),
+    ],
+)
+def test_the_answer_to_how_many_is_the_number(context, published, seen, answer, at_least, told):
+    numeric = {"numeric": True, "count_key": "alice/q/count", "yes_or_no": False, "related": " next to the coke"}
+    root = count_of(context, seen, 1, denied="no beers", **numeric)
+    ((_, note),) = published
+    assert (root.status, root.answer, note["answer"], note.get("at_least", False)) == (S, answer, answer, at_least)
+    assert (context.board.get("alice/q/count"), context.board.get("alice/q/answer")) == (answer, answer)
+    assert root.message.startswith(told)
+
+
 def test_a_count_names_what_no_look_recognised(context):
     unknown = ObjectObservation(0.0, ObjectKind("thing"), (3.0, 0.0, 0.8), (0.06, 0.06, 0.24), 0.0, 0.7, "bench")
     context.board.put("alice/q/bench/unexplained", (unknown,))
     doubts = {f"alice/q/{name}": f"alice/q/{name}/unexplained" for name in ("bench", "trolley")}
     root = count_of(context, ((0.0,), "O"), 1, doubts=doubts)
-    told = "there is one beer on the bench; besides, something 24 cm tall stands on the bench"
+    told = "there is at least one beer on the bench; besides, something 24 cm tall stands on the bench"
     assert root.message == f"yes: beers in the workshop; {told}"
 
 

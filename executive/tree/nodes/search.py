@@ -391,7 +391,6 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
     below = builder.at("search")
     title = f"look for {what if what == ANYTHING else asked}"
     search = below.node("round" if counting else "selector", title, *(look for _, look in looks))
-    leaves = {s: tuple(look.children[-1].path_id for name, look in looks if name == s) for s, _ in looks}
     outputs = {leaf.path_id: leaf.options["outputs"] for _, look in looks for leaf in look.children[1:] if counting}
     tallies, doubts = (
         {p: keys[port] for p, keys in outputs.items() if port in keys} for port in (_TALLY, _UNEXPLAINED)

@@ -84,7 +84,7 @@ def test_the_report_is_the_same_after_json():
     values = json.loads(json.dumps(told.to_json()))
     assert RunReport.from_json(values) == told
     first = {"question": "q", "answer": "in the shed", "sentence": "Robin: in the shed", "t_s": 2.5}
-    assert values["answers"][0] == {**first, "place": "hall", "picture": 0}
+    assert values["answers"][0] == {**first, "place": "hall", "picture": 0, "at_least": False}
     assert values["said"] == [{"t_s": 1.0, "text": "Hello", "asked": False}]
 
 

@@ -29,6 +29,8 @@ BOX_COLOUR: Colour = (255, 190, 0)
 _CAMERA_ABOVE_M = 60.0
 _CUT_HEIGHT_M = 1.9
 _SUBPIXEL_BITS = 4
+_ROBOT_M, _PERSON_M = 0.6, 0.4
+"""Radii about a robot and a person that labels leave free."""
 
 
 @dataclass(frozen=True)
@@ -147,11 +149,12 @@ def draw_map(
     labels: Mapping[str, tuple[float, float]] | None = None,
     marks: Mapping[str, tuple[float, float]] | None = None,
     zones: Sequence[Mapping[str, Any]] = (),
+    people: Sequence[Point] = (),
 ) -> Picture:
     """Draws paths (N, 2 or more columns: x, y), labels and marked points on a copy of a map, with a legend below it.
 
-    Each path has a legend text and a colour. No label covers another one or a mark. The zones, in the form of
-    `skills.zone_map.zone_messages`, are drawn first.
+    Each path has a legend text and a colour. No label covers another one, a mark, a robot at the end of its path, or
+    one of the `people` on the map. The zones, in the form of `skills.zone_map.zone_messages`, are drawn first.
     """
     picture = view.picture.copy()
     for zone in zones:
@@ -166,7 +169,9 @@ def draw_map(
     for pixels, ink in paths.values():
         draw_path(picture, pixels, ink)
         names.keep_clear(pixels[0], 12.0)
-        names.keep_clear(pixels[-1], 16.0)
+        names.keep_clear(pixels[-1], max(16.0, _ROBOT_M * view.pixels_per_m))
+    for at in people:
+        names.keep_clear(view.pixels(np.array([at]))[0], _PERSON_M * view.pixels_per_m)
     for text, pixel in dots.items():
         names.write(text, pixel, ground=BOX_COLOUR)
     for text, centre in (labels or {}).items():

@@ -62,6 +62,22 @@ def test_the_path_is_drawn_at_its_place_on_the_map(scene):
     assert (view.picture == top_view(scene[2], (-4, -3, 4, 3), width=800).picture).all()
 
 
+def test_labels_leave_a_person_and_a_robot_at_the_end_of_its_path_free(scene):
+    view = top_view(scene[2], (-4, -3, 4, 3), width=800)
+    free_W = {"a person": (-2.0, 1.0), "Alice": (2.5, -1.0)}
+    picture = draw_map(view, {"path of Alice": (np.array([[2.5, -1.0, 0.0]]), PATH_COLOUR)})
+    labels = {"hall": free_W["a person"], "kitchen": free_W["Alice"]}
+    named = draw_map(
+        view, {"path of Alice": (np.array([[2.5, -1.0, 0.0]]), PATH_COLOUR)}, labels=labels, people=[free_W["a person"]]
+    )
+    assert (named != picture).any()
+    for (x, y), radius_m in zip(free_W.values(), (0.25, 0.4), strict=True):
+        (left, top), (right, bottom) = np.round(
+            view.pixels(np.array([[x - radius_m, y + radius_m], [x + radius_m, y - radius_m]]))
+        ).astype(int)
+        assert (named[top:bottom, left:right] == picture[top:bottom, left:right]).all()
+
+
 @pytest.mark.parametrize("points", [0, 1])
 def test_short_paths_are_drawn_too(scene, points):
     view = top_view(scene[2], (-4, -3, 4, 3), width=200)

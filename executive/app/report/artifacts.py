@@ -345,7 +345,11 @@ def _map(simulation: Simulation, robots: Sequence[str], zones: Sequence[Mapping[
         f"path of {name}": (simulation.referee.path(name), colours[number % len(colours)])
         for number, name in enumerate(sorted(robots))
     }
-    return draw_map(view, paths, labels=centres, marks=marks, zones=zones)
+    tracks = map(
+        simulation.referee.points, {rule.name for rule in world.seed_rules.people} & {*simulation.referee.names}
+    )
+    people = [(float(track[-1][0]), float(track[-1][1])) for track in tracks if len(track)]
+    return draw_map(view, paths, labels=centres, marks=marks, zones=zones, people=people)
 
 
 def _view(simulation: Simulation, robot_name: str, time_s: float, ahead_m: float) -> Picture:

@@ -274,7 +274,7 @@
       brush.beginPath();
       brush.arc(u, v, 3, 0, 2 * Math.PI);
       brush.fill();
-      this.names.keepClear(u, v, 5, true);
+      this.names.keepClear(u, v, POSE_PX, true);
     }
 
     // The outline of the room of a name, else of the room at a point; null in logs that have no outlines.

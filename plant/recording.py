@@ -77,6 +77,11 @@ class Recorder:
         if len(self.frames) > self._most:
             self.frames = thin_out(self.frames)
 
+    def shorten(self) -> None:
+        """Drops frames until few are left, which are soon written."""
+        while len(self.frames) > _FEWEST_FRAMES:
+            self.frames = thin_out(self.frames)
+
     def frame_at(self, time_s: float) -> Frame:
         """Returns the last frame at or before a time, or the first. Raises LookupError when there are no frames."""
         if not self.frames:

@@ -68,6 +68,14 @@ def test_a_long_recording_has_few_frames_mostly_of_motion(moved):
     assert times[-1] > 1240.0 and sum(100.0 < time_s < 111.0 for time_s in times) > 20
 
 
+def test_a_recording_that_is_written_in_a_hurry_has_few_frames():
+    recorder = Recorder(SimpleNamespace(plant=SimpleNamespace(num_bodies=lambda: 1)), None)
+    recorder.frames = [Frame(float(t), np.array([float(t)])) for t in range(5000)]
+    recorder.shorten()
+    times = [frame.time_s for frame in recorder.frames]
+    assert len(times) <= 400 and (times[0], times[-1]) == (0.0, 4999.0)
+
+
 def test_a_frame_that_lies_between_its_neighbours_goes_first():
     frames = [Frame(float(t), np.array([x])) for t, x in enumerate((0.0, 1.0, 2.0, 9.0, 4.0))]
     assert [frame.time_s for frame in thin_out(frames)] == [0.0, 2.0, 3.0, 4.0]

@@ -86,7 +86,8 @@ def run_fleet(
         if first is not None:
             log_map(log, first.world, first.knowledge)
         control = control or Control(pace=None)
-        with ended_by_signals(dispatch.stop), ended_by_signals(control.cancel), LockStepWorker(backend.clock) as worker:
+        stop, cancel = ended_by_signals(dispatch.stop), ended_by_signals(control.cancel)
+        with stop, cancel as ending, LockStepWorker(backend.clock) as worker:
             result = run(
                 dispatch,
                 clock=backend.clock,
@@ -97,6 +98,8 @@ def run_fleet(
                 spare=dispatch.spare(),
             )
         dispatch.close()
+    if ending.hurried:
+        backend.hurry()
     recording = backend.leave(artifacts, out)
     lasted = f"{backend.clock.now() - begun_s:.1f} s simulated in {result.wall_time_s:.1f} s"
     facts = (("world and seed", f"{first.world.name}, seed {seed}"),) if first is not None else ()

@@ -174,6 +174,10 @@ class Backend(Protocol):
         """
         return None
 
+    def hurry(self) -> None:
+        """Shortens what is written at the end, since the process is about to be killed."""
+        return None
+
     def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
         """Writes recording and pictures into the folder `out`; returns the recording's path, None if there is none."""
         return None

@@ -103,6 +103,8 @@ def run_request(
                 log(ERROR_TOPIC, {"node": prepared.tree.robot_name, "what": "store its state", "traceback": trouble})
         counts = dict(sorted(Counter({**result.work, **backend.work(), "bytes_logged": log.bytes}).items()))
         log(WORK, counts)
+    if ending.hurried:
+        backend.hurry()
     finished, recording = _conclude(prepared, backend, result, log, artifacts, counts)
     for display in displays:
         display.reported(recording, out / REPORT, tuple(finished.report.every_verdict()))

@@ -42,11 +42,11 @@ def ended_by_signals(end: Callable[[str], None]) -> Iterator[Ending]:
 
 
 class Ending:
-    """Handler of the signals; `hung_up` says that the terminal was closed."""
+    """Handler of the signals; `hung_up` says that the terminal was closed, `hurried` that SIGTERM has come."""
 
     def __init__(self, end: Callable[[str], None], terminals: Sequence[int]) -> None:
         self._end, self._terminals = end, terminals
-        self._asked, self.hung_up = "", False
+        self._asked, self.hung_up, self.hurried = "", False, False
         self.outer: Ending | None = None
         self.outer_alarm: Any = None
 
@@ -65,6 +65,7 @@ class Ending:
         else:
             self._asked = reason
         if number == signal.SIGTERM:
+            self.hurried = True
             signal.setitimer(signal.ITIMER_REAL, _ENDS_WITHIN_S)
         self._end(reason)
         if self.outer is not None:

@@ -137,6 +137,11 @@ class SimulatedBackend(Backend):
         verdict = verdict_of(tree, result, self._settled().referee.judge, before=before, since_s=since_s)
         return replace(verdict, events=self._simulation.referee.events)
 
+    def hurry(self) -> None:
+        """Leaves few frames in the recording."""
+        if (recorder := self._settled().recorder) is not None:
+            recorder.shorten()
+
     def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
         """Writes recording and pictures of a recorded run; returns the recording's path."""
         if not self._record:

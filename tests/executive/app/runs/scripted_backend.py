@@ -35,5 +35,8 @@ class ScriptedBackend:
     def work(self):
         return {"calls": len(self.robot.calls)}
 
+    def hurry(self):
+        self.asked.append("hurry")
+
     def leave(self, artifacts, out):
         return None

@@ -1,6 +1,7 @@
 """A run on a backend without plant, referee and recorder: nothing but the backend knows that it is not simulated."""
 
 import json
+import signal
 import socket
 import sys
 from dataclasses import replace
@@ -25,6 +26,7 @@ from skills.inputs.errors import InputError
 from tests.executive.app.runs.scripted_backend import ScriptedBackend
 from tests.executive.cli.calls import refusal
 from tests.executive.distribution import write_distribution
+from tests.visitors import OnTick
 
 
 @pytest.fixture
@@ -98,6 +100,15 @@ def test_the_report_says_how_a_real_robot_sensed(prepared):
     assert RunReport.from_json(json.loads(json.dumps(report.to_json()))).notes == ("There is no LiDAR.",)
     assert "  There is no LiDAR." in list(report.lines())
     assert "There is no LiDAR." in (prepared.request.out / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(("number", "hurries"), [(signal.SIGTERM, True), (signal.SIGINT, False)])
+def test_sigterm_shortens_what_a_run_leaves(prepared, number, hurries):
+    backend, coming = ScriptedBackend(), [number]
+    ended = run_request(
+        prepared, backend, visitors=[OnTick(lambda progress: coming and signal.raise_signal(coming.pop()))]
+    )
+    assert (ended.report.outcome, "hurry" in backend.asked) == ("cancelled", hurries)
 
 
 def test_faults_and_events_are_at_work_logged_and_in_the_report(prepared):

@@ -104,7 +104,7 @@ async def _say_error(request: Request, error: Exception) -> Response:
     status, headers = HTTPStatus(getattr(error, "status_code", 500)), dict(getattr(error, "headers", None) or {})
     allowed = f"; use {headers['Allow']}" if "Allow" in headers else ""
     said = f"{request.method} {request.url.path}: {status.phrase.lower()}{allowed}"
-    return JSONResponse({"error": said}, status, headers)
+    return JSONResponse({"error": error.detail if isinstance(error, CallError) else said}, status, headers)
 
 
 class Server:
@@ -181,12 +181,8 @@ async def body_of(request: Request) -> bytes | None:
     return body
 
 
-class CallError(Exception):
-    """Raised to refuse a call, with a reason and an HTTP status."""
-
-    def __init__(self, status: HTTPStatus, reason: str) -> None:
-        super().__init__(reason)
-        self.status = status
+class CallError(HTTPException):
+    """Raised to refuse a call, with an HTTP status and a reason."""
 
 
 CallHandler = Callable[[str, bytes], Mapping[str, Any]]
@@ -215,18 +211,15 @@ class CallServer(Server):
         scheme, _, given = request.headers.get("authorization", "").partition(" ")
         right = secrets.compare_digest(given.strip().encode(), self._token.encode())
         if scheme.lower() != "bearer" or not right:
-            said = {"error": "the token is missing or wrong: send 'Authorization: Bearer TOKEN'"}
-            return JSONResponse(said, HTTPStatus.UNAUTHORIZED, {"WWW-Authenticate": "Bearer"})
+            said = "the token is missing or wrong: send 'Authorization: Bearer TOKEN'"
+            raise CallError(HTTPStatus.UNAUTHORIZED, said, {"WWW-Authenticate": "Bearer"})
         trust(request)
         if request.url.query:
-            said = {"error": "values belong into the body, as JSON: leave out all from '?' on, and send them there"}
-            return JSONResponse(said, HTTPStatus.BAD_REQUEST, {"Connection": "close"})
+            said = "values belong into the body, as JSON: leave out all from '?' on, and send them there"
+            raise CallError(HTTPStatus.BAD_REQUEST, said, {"Connection": "close"})
         body = await body_of(request)
         if body is None:
-            said = {"error": f"the body is too large or comes too slowly: send {BODY_LIMITS}"}
-            return JSONResponse(said, HTTPStatus.REQUEST_ENTITY_TOO_LARGE, {"Connection": "close"})
-        try:
-            answer = await asyncio.to_thread(self._handler, request.path_params["name"], body)
-        except CallError as refusal:
-            return JSONResponse({"error": str(refusal)}, refusal.status)
+            said = f"the body is too large or comes too slowly: send {BODY_LIMITS}"
+            raise CallError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, said, {"Connection": "close"})
+        answer = await asyncio.to_thread(self._handler, request.path_params["name"], body)
         return JSONResponse(dict(answer), HTTPStatus.ACCEPTED)

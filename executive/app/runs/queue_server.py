@@ -289,7 +289,7 @@ class TriggerCalls:
         try:
             self._queue(OnTopic(kind, topic), payload)
         except CallError as refusal:
-            self._tell(f"{OnTopic(kind, topic)}: {refusal}")
+            self._tell(f"{OnTopic(kind, topic)}: {refusal.detail}")
 
     def _queue(self, trigger: OnCall | OnTopic, body: bytes) -> tuple[StoredMission, ...]:
         """Queues the standing missions that wait for a trigger, with the values in the body. Raises CallError."""

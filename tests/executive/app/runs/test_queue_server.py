@@ -487,7 +487,7 @@ def test_values_that_do_not_fit_are_refused_and_nothing_is_queued(calls, stand, 
     stand("call a")
     with pytest.raises(CallError, match=words) as refusal:
         calls.called("a", body)
-    assert (refusal.value.status, queued()) == (400, [])
+    assert (refusal.value.status_code, queued()) == (400, [])
 
 
 # The missions that stand by, the call, how often it was made before -> the status and the words of the refusal.
@@ -506,7 +506,7 @@ def test_a_call_that_nothing_can_take_is_refused_with_its_status(calls, stand, t
         calls.called(name, b"")
     with pytest.raises(CallError, match=says) as refusal:
         calls.called(name, b"")
-    assert refusal.value.status == status
+    assert refusal.value.status_code == status
 
 
 def test_a_message_queues_what_waits_for_its_topic(calls, stand, queued):

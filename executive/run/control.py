@@ -92,12 +92,9 @@ class Control:
     @property
     def state(self) -> ControlState:
         """Present state of the control."""
-        present = self._mode()
         return ControlState(
             self._version,
-            present.mode,
-            present.reason,
-            self._at,
+            *(self._mode().mode, self._mode().reason, self._at),
             tuple(each.open for each in self._questions.values()),
             self._requests.breakpoints,
             dict(self._missions),
@@ -111,10 +108,7 @@ class Control:
         return self.state
 
     def pause(self, reason: str = "paused by the operator", *, robot: str | None = None) -> None:
-        """Pauses all robots, or one of them; the trees keep their state. Idempotent; the last reason counts.
-
-        Raises ValueError when the run has no such robot.
-        """
+        """Pauses all robots, or one of them; the last reason counts. Raises ValueError for an unknown robot."""
         if robot is None:
             self._stride = None
         self._hold(robot, Mode.PAUSED, "pause", reason)

@@ -8,7 +8,7 @@ nodes that are `Suspendable` stop; each continues when it is ticked the next tim
 suspended does not count against its limit.
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, ClassVar, Protocol, dataclass_transform, runtime_checkable
@@ -374,12 +374,6 @@ def cause_of(node: Behaviour) -> Cause:
 def failed_for_good(node: Behaviour) -> bool:
     """Returns whether the node, or one below it, has a failure that is final."""
     return any(isinstance(one, Explained) and one.status == Status.FAILURE and one.final for one in node.iterate())
-
-
-def looked(root: Behaviour, leaves: Collection[str]) -> list[str]:
-    """Returns those of the leaves below a node that took a look, even if it found nothing."""
-    ended = (node for node in root.iterate() if isinstance(node, Explained) and node.path_id in leaves)
-    return [node.path_id for node in ended if node.status == Status.SUCCESS or node.cause == Cause.POSTCONDITION]
 
 
 def message_of(node: Behaviour) -> str:

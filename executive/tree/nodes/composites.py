@@ -12,12 +12,13 @@ from py_trees.common import Status
 
 from executive.mission.gripper import held_after_either
 from executive.tree.assembly import Assembler, StepPlans, words_of
-from executive.tree.behaviour import MemoryComposite, applies, cause_of, failed_for_good, looked, message_of
+from executive.tree.behaviour import MemoryComposite, applies, cause_of, failed_for_good, message_of
 from executive.tree.board import Board
 from executive.tree.estimate import Estimate, Walk
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.decision_nodes import decide_plan
 from executive.tree.nodes.policies import FINAL_CAUSES
+from executive.tree.nodes.search import looked
 from executive.tree.plan import Assembled, PlanBuilder
 from executive.words import steps as model
 from executive.words.expression import Value

@@ -1,14 +1,15 @@
 """Searches for objects and people from viewpoints in order, and answers whether they are there."""
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from types import MappingProxyType
 from typing import ClassVar, Final
 
+from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviour import Explained, ExplainedDecorator, looked
+from executive.tree.behaviour import Explained, ExplainedDecorator
 from executive.tree.board import Board, FromBoard, SurfaceOfDetection
 from executive.tree.context import ANSWER_TOPIC
 from executive.tree.goals import surfaces_left_out, surfaces_to_search
@@ -150,6 +151,12 @@ class Answer(ExplainedDecorator):
         note = {"node": self.path_id, "question": self.question, "answer": answer, "message": self.message}
         self.publish(ANSWER_TOPIC, note | ({"at_least": True} if is_least else {}))
         return Status.SUCCESS
+
+
+def looked(root: Behaviour, leaves: Collection[str]) -> list[str]:
+    """Returns those of the leaves below a node that took a look, even if it found nothing."""
+    ended = (node for node in root.iterate() if isinstance(node, Explained) and node.path_id in leaves)
+    return [node.path_id for node in ended if node.status == Status.SUCCESS or node.cause == Cause.POSTCONDITION]
 
 
 def surfaces_elsewhere(

@@ -81,6 +81,7 @@ def use_server(certificate: Path, port: int) -> None:
 
         opened, data_acquisition_helpers.urlopen = data_acquisition_helpers.urlopen, open_url
     told, ResponseError.__str__ = ResponseError.__str__, reason  # it names what was refused
+    ResponseError.__repr__ = lambda self: f"{type(self).__name__}({str(self)!r})"
     Sdk.load_robot_cert, channel.create_secure_channel = load_robot_cert, create_secure_channel
     AuthClient.auth, AuthClient.auth_async = logged_in(AuthClient.auth), logged_in(AuthClient.auth_async)
 

@@ -223,7 +223,7 @@ REFUSED = {
     "disable_ir_emission": _refused(
         "disable_ir_emission.py HOST --disable", "IREnableDisableService", 'Service name "ir-enable-disable-service"'
     ),
-    "joint_control": _refused("noarm_squat.py HOST", "a stream for 12 joints of a robot that has 19", "", exit_code=0),
+    "joint_control": _refused("noarm_squat.py HOST", "a stream for 12 joints", "19 are needed", exit_code=0),
     "payloads": _refused(
         "payloads.py HOST --payload-credentials-file-1 PAYLOAD --payload-credentials-file-2 PAYLOAD",
         "PayloadRegistrationService",

@@ -9,6 +9,7 @@ steps the robot whenever its main thread sleeps.
 
 from __future__ import annotations
 
+import logging
 import os
 import queue  # noqa: F401  it keeps the true time, as `grpc` does
 import re
@@ -52,7 +53,7 @@ def refuse_old_sdk() -> None:
 
 def use_server(certificate: Path, port: int) -> None:
     """Makes the SDK of this process reach and trust the server whatever address, certificate or login it names."""
-    from bosdyn.client import channel
+    from bosdyn.client import channel, robot_command
     from bosdyn.client.auth import AuthClient
     from bosdyn.client.exceptions import ResponseError
     from bosdyn.client.sdk import Sdk
@@ -80,6 +81,15 @@ def use_server(certificate: Path, port: int) -> None:
             return opened(request, *arguments, **named)
 
         opened, data_acquisition_helpers.urlopen = data_acquisition_helpers.urlopen, open_url
+    if streaming := getattr(robot_command, "RobotCommandStreamingClient", None):
+
+        def stream(self: Any, commands: Any) -> Any:
+            answer = sent(self, commands)
+            if answer.message:  # programs do not look at it
+                logging.warning("JointControlStream: %s", answer.message)
+            return answer
+
+        sent, streaming.send_joint_control_commands = streaming.send_joint_control_commands, stream
     told, ResponseError.__str__ = ResponseError.__str__, reason  # it names what was refused
     ResponseError.__repr__ = lambda self: f"{type(self).__name__}({str(self)!r})"
     Sdk.load_robot_cert, channel.create_secure_channel = load_robot_cert, create_secure_channel

@@ -6,7 +6,6 @@ joints set the body's pose over the feet, which is height, pitch, turn and shift
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from threading import Lock
@@ -30,7 +29,6 @@ from plant.robots.spot.legs import LegKinematics
 from skills.geometry import compose
 from skills.robot import ArmTrajectory, FloatArray, Pose2D
 
-_LOG: Final = logging.getLogger(__name__)
 _Answer = robot_command_pb2.JointControlStreamResponse
 _Response = robot_command_pb2.RobotCommandResponse
 _Progress = basic_command_pb2.RobotCommandFeedbackStatus
@@ -227,10 +225,8 @@ class RobotCommandStreamingService(Service):
         try:
             self._take_all(requests)
         except RefusedError as refused:
-            _LOG.warning("JointControlStream is refused: %s", refused)
             return _Answer(status=refused.status, message=str(refused))
         except InvalidRequestError as invalid:
-            _LOG.warning("JointControlStream is refused: %s", invalid)
             return _Answer(status=_Answer.STATUS_INVALID_REQUEST, message=str(invalid))
         finally:
             self._lock.release()

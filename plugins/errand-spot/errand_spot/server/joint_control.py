@@ -25,7 +25,7 @@ from errand_spot.server.leases import ARM, GRIPPER, MOBILITY
 from errand_spot.server.mobility import FEET_M, drive, error_to
 from errand_spot.server.posture import ROLL_RAD, SHIFT_M, TWIST_RAD
 from errand_spot.server.refusals import RefusedError, check_values, end_of, unsupported
-from plant.robots.spot.legs import LegKinematics
+from plant.robots.spot.description import spot_facts
 from skills.geometry import compose
 from skills.robot import ArmTrajectory, FloatArray, Pose2D
 
@@ -75,15 +75,15 @@ def positions(snapshot: Snapshot, names: Sequence[str]) -> list[float]:
     return [snapshot.joints.position_rad.get(our_joint(name), 0.0) for name in names]
 
 
-def _feet_B(legs_rad: FloatArray) -> FloatArray:
+def feet_B(legs_rad: FloatArray) -> FloatArray:
     """Positions (4, 3) of the feet in the body frame for leg joints (12,)."""
-    made = []
-    for foot, (hx, hy, kn) in zip(FEET_M, legs_rad.reshape(4, 3), strict=True):
-        leg = LegKinematics.from_facts(foot)
-        knee = np.array([leg.thigh_x_m, 0.0, -leg.thigh_z_m])
-        shin = RotationMatrix.MakeYRotation(kn) @ np.array([0.0, 0.0, -leg.shin_m])
-        hip = np.array([0.0, leg.side_m, 0.0]) + RotationMatrix.MakeYRotation(hy) @ (knee + shin)
-        made.append(np.array(leg.p_BHip) + RotationMatrix.MakeXRotation(hx) @ hip)
+    made, facts = [], spot_facts()["legs"]
+    thigh, shin = np.array(facts["lower_leg"]["offset"]), np.array(facts["foot"]["xyz"])
+    for (x, y), (hx, hy, kn) in zip(np.sign([*FEET_M.values()]), legs_rad.reshape(4, 3), strict=True):
+        side, mirror = np.array([x, y, 1.0]), np.array([1.0, y, 1.0])
+        knee = RotationMatrix.MakeYRotation(hy) @ (mirror * thigh + RotationMatrix.MakeYRotation(kn) @ (mirror * shin))
+        leg = RotationMatrix.MakeXRotation(hx) @ (mirror * np.array(facts["upper_leg"]["offset"]) + knee)
+        made.append(side * np.array(facts["hip"]["offset"]) + leg)
     return np.array(made)
 
 
@@ -104,7 +104,7 @@ class JointControl:
         legs_rad = np.array(positions(snapshot, LEG_JOINTS))
         self._computer, self._last_s = computer, computer.now_s()
         self._feet_O = computer.feet_O or snapshot.odometry.pose
-        self._feet_F = (self._feet_O.transform().inverse() @ snapshot.odometry.X_OB) @ _feet_B(legs_rad).T
+        self._feet_F = (self._feet_O.transform().inverse() @ snapshot.odometry.X_OB) @ feet_B(legs_rad).T
         self._arm_rad = None if computer.solver is None else computer.arm_rad(snapshot.joints)
         self._finger_rad = -snapshot.gripper.opening
         computer.move(dict.fromkeys((MOBILITY, ARM, GRIPPER), self))
@@ -178,12 +178,12 @@ class JointControl:
 
         Raises InvalidRequestError where a foot would lift or slide, or the body leave its range.
         """
-        feet_B = _feet_B(legs_rad)
-        R_FB = Rotation.align_vectors(self._feet_F.T - self._feet_F.mean(axis=1), feet_B - feet_B.mean(axis=0))[0]
+        p_BF = feet_B(legs_rad)
+        R_FB = Rotation.align_vectors(self._feet_F.T - self._feet_F.mean(axis=1), p_BF - p_BF.mean(axis=0))[0]
         X_FB = RigidTransform(RotationMatrix(R_FB.as_matrix()), self._feet_F.mean(axis=1))
-        X_FB = X_FB @ RigidTransform(-feet_B.mean(axis=0))
+        X_FB = X_FB @ RigidTransform(-p_BF.mean(axis=0))
         angles, (x, y, height) = RollPitchYaw(X_FB.rotation()), X_FB.translation()
-        off_m = float(np.linalg.norm(X_FB @ feet_B.T - self._feet_F, axis=0).max())
+        off_m = float(np.linalg.norm(X_FB @ p_BF.T - self._feet_F, axis=0).max())
         can, slack = self._computer.capabilities, 0.01
         ranges: Mapping[str, tuple[float, float, float]] = {
             "a foot's distance from its place on the floor (m)": (off_m, 0.0, _SLIP_M),

@@ -13,36 +13,46 @@ from bosdyn.client.robot_command import (
     UnsupportedError,
 )
 from bosdyn.client.robot_state import RobotStateStreamingClient
+from pydrake.math import RigidTransform, RollPitchYaw
+from scipy.optimize import least_squares
 
-from errand_spot.messages import timestamp
+from errand_spot.messages import our_joint, timestamp
 from errand_spot.server.computer import Pace
-from plant.robots.spot.description import LEGS, leg_joint_names
-from plant.robots.spot.legs import LegKinematics, nominal_footholds
+from errand_spot.server.joint_control import LEG_JOINTS, feet_B
 from skills.testing.robot import ScriptedRobot
 
 PACE, SHARED = Pace.CLIENT, True
 Answer = robot_command_pb2.JointControlStreamResponse
 FOOT_M = 0.036
+FEET_F = np.array([[0.298, 0.166, 0.0], [0.298, -0.166, 0.0], [-0.298, 0.166, 0.0], [-0.298, -0.166, 0.0]])
+"""Feet (4, 3) around their middle on the floor."""
+
+
+STANDING_RAD = np.tile([0.0, 0.85, -1.58], 4)
+"""Leg joints of a standing body, by the maker."""
 
 
 def legs_rad(height_m, pitch_rad=0.0, ahead_m=0.0, wider_m=0.0):
     """Leg joints (12,) of a body at a height and pitch, shifted ahead, over feet that stand wider apart."""
-    made, c, s = [], np.cos(pitch_rad), np.sin(pitch_rad)
-    for leg, (x, y) in zip(LEGS, nominal_footholds(), strict=True):
-        x, z = x - ahead_m, FOOT_M - height_m
-        foot = c * x - s * z, y + wider_m * np.sign(y), s * x + c * z
-        made += LegKinematics.from_facts(leg).joints(foot)
-    return np.array(made)
+    X_FB = RigidTransform(RollPitchYaw(0.0, pitch_rad, 0.0), [ahead_m, 0.0, height_m])
+    wider = [[0.0, wider_m * side, FOOT_M] for side in (1, -1, 1, -1)]
+    p_BF = (X_FB.inverse() @ (FEET_F + wider).T).T
+    return least_squares(lambda q: (feet_B(q) - p_BF).ravel(), STANDING_RAD).x
 
 
 def with_legs(robot):
     """Joints of the scripted robot with those of legs on the floor."""
     joints = ScriptedRobot.joints(robot)
-    names = [name for leg in LEGS for name in leg_joint_names(leg)]
-    legs = dict(zip(names, legs_rad(robot.height_m, robot.pitch_rad).tolist(), strict=True))
+    legs = dict(zip(map(our_joint, LEG_JOINTS), legs_rad(robot.height_m, robot.pitch_rad).tolist(), strict=True))
     still = dict.fromkeys(legs, 0.0)
     added = {"position_rad": legs, "velocity_rad_s": still, "effort_nm": still}
     return replace(joints, **{name: {**getattr(joints, name), **values} for name, values in added.items()})
+
+
+def test_the_feet_of_a_standing_robot_are_below_its_hips():
+    p_BF = feet_B(STANDING_RAD)
+    assert p_BF[:, 2] == pytest.approx([FOOT_M - 0.52] * 4, abs=0.01)
+    assert p_BF[:, :2] == pytest.approx(FEET_F[:, :2], abs=0.03)
 
 
 @pytest.fixture

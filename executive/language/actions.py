@@ -178,8 +178,7 @@ def _located(clause: Predicate, being: Being, roles: Roles, objects: Sequence[Ph
 def _narrated(being: Being, roles: Roles) -> Action:
     """Reads a narrated event with its object; an event is no request."""
     lacked = [place.phrase for place in roles.sources if place.preposition == "out of"]
-    topics = [phrase for phrase in (*roles.objects, roles.searched, *lacked) if phrase is not None]
-    topics = topics or [phrase for phrase in (being.topic,) if phrase is not None]
+    topics = [*filter(None, (*roles.objects, roles.searched, *lacked))] or [*filter(None, (being.topic,))]
     named = tuple(phrase for phrase in topics if not (phrase.pronoun or phrase.receiver))
     place = next(iter([*roles.ats, *roles.goals]), None)
     return Action(None, being.text, named[:1], place, teller=being.teller)

@@ -205,7 +205,9 @@ def end_of_scope(clauses: Sequence[Clause], at: int, *, branch: bool = False, ro
 @cache
 def _rewording() -> Page:
     """Templates of other words for the same, with the words of the installed tasks."""
-    return Page("rewording", opener=tuple(task_openers(Part.PERSON)), opener_form=dict(task_forms()) or ())
+    forms, opener = dict(task_forms()), tuple(task_openers(Part.PERSON))
+    own = {form: verb for form, verb in forms.items() if verb in task_openers(templates=True)}
+    return Page("rewording", opener=opener, opener_form=forms or (), own_form=own or ())
 
 
 @cache

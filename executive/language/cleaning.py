@@ -7,17 +7,18 @@ name in a story ("Hey, Alice told me ...", "my sister, Alice") calls nobody.
 
 import re
 import unicodedata
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
-from executive.language.lexicon import read_table, word_list
+from executive.language.lexicon import ONE_WORD, read_table, word_list
 from executive.language.spelling import sound_distance
 from executive.language.templates import page
 from executive.words.task import installed_tasks
 
 _APART: Final = re.compile(r" ((?:n't|'(?:m|s|d|re|ve|ll))\b)", re.IGNORECASE)
 _ALLOWED: Final = re.compile(r"[^\w\s,.;:!?'\-]|_")
+_QUOTED: Final = re.compile(r"(?<=\w)(:? )([\"'])(?=\w)(.+?)(?<=\S)\2(?!\w)")
 _AND: Final = re.compile(r"(?<=\s)[&+](?=\s)")
 _PERCENT: Final = re.compile(r"(?<=\d)\s?%")
 _SIGNS: Final = r"$€£%#@&+=|\\/^~_{}<>\[\]"
@@ -38,12 +39,24 @@ SAME_NAME_ALONE: Final = 0.05
 
 
 def clean(text: str) -> str:
-    """Removes control characters, brackets, emoji, repeated blanks; makes quotes plain, and joins "i 'm" to "i'm"."""
+    """Removes control characters, brackets, emoji, repeated blanks; makes quotes plain, and joins "i 'm" to "i'm".
+
+    A quotation behind a word that would be split into clauses becomes one word, which `unquoted` reads.
+    """
     plain = unicodedata.normalize("NFKC", _PERCENT.sub(" percent", _AND.sub("and", text)))
     plain = plain.replace("\u2019", "'").replace("\u2018", "'").replace("...", ",")
+    plain = _QUOTED.sub(_as_one_word, re.sub("[\u201c\u201d]", '"', plain))
     printable = "".join(" " if unicodedata.category(c).startswith(("C", "S", "Z")) else c for c in plain)
     spaced = " ".join(_ALLOWED.sub(" ", printable).split())
     return _APART.sub(r"\1", spaced)
+
+
+def _as_one_word(quotation: re.Match[str]) -> str:
+    """Joins the words of a quotation with clauses by letters that English has not."""
+    before, _, said = quotation.groups()
+    if word_list("splits").isdisjoint(re.findall(r"\w+|[^\w\s]", said.lower().rstrip(",.;:!?"))):
+        return quotation[0]
+    return before + " ".join(_ALLOWED.sub(" ", said).split()).translate(ONE_WORD)
 
 
 def placeholder(text: str) -> str | None:
@@ -65,14 +78,15 @@ def foreign_reason(text: str) -> str | None:
     return f"I understand English only, and this looks like {language}"
 
 
-def unkept_reason(text: str, lost: str) -> str | None:
-    """Reason to refuse a text with words of a kind that no mission keeps, as a deadline.
+def unkept_reason(text: str, lost: str, rows: Iterable[Mapping[str, str]] | None = None) -> str | None:
+    """Reason to refuse a text with words of a kind that no mission keeps, as a deadline, by some `rows` or by all.
 
     None if no such words are among those that are `lost`, or more others are than the row allows.
     """
     words = {*lost.lower().split()}
     tasks = installed_tasks().values()
-    for row in (*read_table("unkept.yaml"), *(row for task in tasks for row in task.unkept)):
+    every = (*read_table("unkept.yaml"), *(row for task in tasks for row in task.unkept))
+    for row in every if rows is None else rows:
         if row.get("lacks") in {task.owner for task in tasks}:
             continue
         found = re.search(rf"\b(?:{row['said']})", text, re.IGNORECASE)

@@ -168,13 +168,8 @@ def spoken_command(frame: CommandFrame) -> Command:
     """Command with names as the speaker said them."""
     goal, within = frame.goal, None if frame.goal is None else frame.goal.within
     person = goal is not None and goal.person
-    return Command(
-        item=None if frame.item is None else frame.item.object_kind,
-        goal=None if goal is None else goal.name if person else goal.text,
-        goal_at=within.text if person and within is not None else None,
-        task=frame.task,
-        object=None if frame.object is None else frame.object.object_kind,
-        item_count=1 if frame.item is None else frame.item.count,
-        object_count=1 if frame.object is None else frame.object.count,
-        verb=frame.verb,
-    )
+    item, thing = (None if one is None else one.object_kind for one in (frame.item, frame.object))
+    item_count, count = (1 if one is None else one.count for one in (frame.item, frame.object))
+    name = None if goal is None else goal.name if person else goal.text
+    at = within.text if person and within is not None else None
+    return Command(item, name, at, frame.task, thing, item_count, count, frame.verb)

@@ -136,10 +136,8 @@ def _with_meaning(items: list[Item], said: Item | None, meant: Phrase, pronouns:
 
 def _corrected(done: list[Item], rest: list[Item], mark: Correction) -> tuple[list[Item], list[Item]]:
     """Replaces the corrected item by the item that follows it."""
-    ahead, verb = (
-        [*dropwhile(lambda item: isinstance(item, Separator | Correction), rest)],
-        last_index(done, lambda item: isinstance(item, Verb)),
-    )
+    ahead = [*dropwhile(lambda item: isinstance(item, Separator | Correction), rest)]
+    verb = last_index(done, lambda item: isinstance(item, Verb))
     before, clause = done[:verb], done[verb:]
     match ahead:
         case _ if all(isinstance(item, Separator) for item in done):

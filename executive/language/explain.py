@@ -1,6 +1,7 @@
 """Explains how a sentence became its commands: as JSON values, lines of text, or a drawing of the dependencies."""
 
 import enum
+import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
@@ -8,7 +9,7 @@ from typing import Any, Final
 from executive.language.actions import Action
 from executive.language.command_frames import spoken_command
 from executive.language.items import Predicate, spoken_words
-from executive.language.lexicon import any_of, lexicon, word_list
+from executive.language.lexicon import any_of, lexicon, unquoted, word_list
 from executive.language.pipeline import Trace
 from executive.language.tokens import Token
 from executive.words.steps import steps_to_yaml
@@ -47,7 +48,7 @@ def explain(trace: Trace) -> dict[str, Any]:
     if trace.actions:  # the addressed robot acts in every request
         said = (t.text for t in trace.tokens if t.relation == "nsubj" and t.pos in ("PRON", "PROPN"))
         subject = "you (the robot)" if any(action.kind for action in trace.actions) else next(said, None)
-    return {
+    values = {
         "text": trace.text,
         "plain": trace.opened,
         "subject": subject,
@@ -63,6 +64,7 @@ def explain(trace: Trace) -> dict[str, Any]:
         "refused_at": trace.refused_at,
         "reason": None if trace.refusal is None else trace.refusal.reason,
     }
+    return dict(json.loads(unquoted(json.dumps(values, ensure_ascii=False))))
 
 
 def _token_values(token: Token) -> dict[str, Any]:
@@ -116,7 +118,7 @@ def explanation_lines(trace: Trace) -> Iterator[str]:
         f"refused at {trace.refused_at!r}": [] if trace.refusal is None else [trace.refusal.reason],
     }
     for title, lines in sections.items():
-        shown = [f"  {line}" for line in lines]
+        shown = [f"  {unquoted(line)}" for line in lines]
         yield from (f"{title}:", *shown) if shown else ()
 
 

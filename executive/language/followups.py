@@ -141,7 +141,6 @@ class Remark(enum.Enum):
 def parse_remark(text: str) -> Remark | None:
     """Parses a whole sentence as a remark; None for any other sentence, such as a request."""
     words = re.sub(r"[^\w\s']", " ", text[:_MOST_LETTERS].replace("’", "'"))
-    forms = page(
-        "remarks", opener=tuple(task_openers()), opener_form=tuple(form for form in task_forms() if form[-3:] == "ing")
-    )
+    doing = tuple(form for form in task_forms() if form[-3:] == "ing")
+    forms = page("remarks", opener=tuple(task_openers()), opener_form=doing)
     return next((remark for remark in Remark if forms[remark.value].fullmatch(words)), None)

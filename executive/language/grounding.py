@@ -79,9 +79,8 @@ def leave_out(unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge
         commands = [replace(one, item=rest(one.item), object=rest(one.object)) for one in commands]
         visits = [one for one in commands if one.item is None and one.task is None and one.goal in knowledge.rooms]
         if phrase.kind is NounKind.PLACE and len(visits) > 1 and not names:
-            room = knowledge.place(phrase.text)
-            if room is None:
-                raise RefusalError(f"I know no place {phrase.text!r} to leave out", [phrase.text])
+            if (room := knowledge.place(phrase.text)) not in knowledge.rooms:
+                raise RefusalError(f"I know no room {phrase.text!r} to leave out", [phrase.text])
             commands = [one for one in commands if one not in visits or one.goal != room]
     return tuple(commands)
 
@@ -95,14 +94,10 @@ def _without(world: Knowledge, unwanted: Phrase, names: Sequence[str], kind: Obj
     rest = except_for(kept, *dict.fromkeys((*others, names[0])))
     told = max((attributes for attributes, _ in _readings(unwanted)), key=len, default=())
     non = tuple(f"{NON}{colour}" for colour in told)
-    if (
-        len(told) == 1
-        and {*non} <= known_attributes()
-        and kept not in (ANYTHING, EVERYTHING)
-        and not unwanted.relations
-    ):
+    named = kept not in (ANYTHING, EVERYTHING) and not unwanted.relations
+    if named and len(told) == 1 and {*non} <= known_attributes():
         return replace(kind, attributes=non)
-    if told or unwanted.relations or kept in (ANYTHING, EVERYTHING) or not world.classes(rest):
+    if told or not named or not world.classes(rest):
         raise RefusalError(f"I cannot follow the exclusion of '{unwanted.spoken}'; name a kind", [unwanted.spoken])
     return replace(kind, name=rest)
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Mapping, Set
 from functools import cache
 from importlib import resources
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import yaml
 
@@ -50,20 +50,18 @@ def plain_yaml(text: str) -> Any:
     return yaml.load(text, Loader=getattr(yaml, "CBaseLoader", yaml.BaseLoader))
 
 
-WordList = Literal[
-    "any_person", "anyone", "asides", "asked_with", "asks", "at_is_goal", "bare_goal", "belongs", "belongs_where",
-    "by_hand", "calls", "definite", "directions", "discards", "docks", "ends", "enters", "everyone", "fixtures",
-    "follows", "fullness", "gives", "goal_wanted", "goes_back", "hands", "heard_greetings", "here", "hesitations",
-    "hurls", "leaves", "levels", "light_whole", "loose", "loose_numbers", "no_numbers", "openers", "owners", "people",
-    "placing", "pointing", "postures", "prepared", "pronouns", "quantities", "relative", "requests", "some_of_them",
-    "somebody", "source_wanted", "speaker", "stacks", "subjects", "there", "titles", "to_recipient", "units",
-    "vague_numbers", "verbs_too", "wait", "wants", "whatever", "worn", "written", "yes",
-]  # fmt: skip
-"""Name of a plain list of words in verbs.yaml or words.yaml."""
+ONE_WORD: Final = {ord(mark): 0xA000 + ord(mark) for mark in " ,.;:!?'-"}
+"""Letters, which English has not, for the marks in a quotation: it becomes one word."""
+_MARKS: Final = {letter: mark for mark, letter in ONE_WORD.items()}
+
+
+def unquoted(text: str) -> str:
+    """Returns a text with the words of its quotations."""
+    return text.translate(_MARKS)
 
 
 @cache
-def word_list(name: WordList) -> Set[str]:
+def word_list(name: str) -> Set[str]:
     """Returns the words, or the phrases, of a list in the order of its table."""
     return dict.fromkeys({**read_table("verbs.yaml"), **read_table("words.yaml")}[name]).keys()
 

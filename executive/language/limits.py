@@ -25,9 +25,8 @@ def check_feasible(actions: Sequence[Action], knowledge: Knowledge | None) -> No
     """
     for reason, find in _REFUSED.items():
         if said := [*filter(None, chain(*map(find, actions)))]:
-            raise RefusalError(
-                reason.format(quoted=listing(map(repr, said)), said=", ".join(said), able=abilities()), said
-            )
+            words = {"quoted": listing(map(repr, said)), "said": ", ".join(said), "able": abilities()}
+            raise RefusalError(reason.format(**words), said)
     actions = actions if knowledge is None else [*_unbound(actions)]
     moved = [target for action in actions for target in action.objects[:1] if _moved(action, target)]
     outside = [(part, part) for action in actions for part in _outside(action, action.target in moved)]

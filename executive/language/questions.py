@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from enum import Enum
 from typing import Any, Final
 
-from executive.language.lexicon import word_list
+from executive.language.lexicon import unquoted, word_list
 from executive.words.mission import QuestionPolicy
 from executive.words.task import installed_tasks
 from skills.inputs.errors import listing
@@ -171,9 +171,9 @@ class RefusalError(Exception):
         kind: RefusalKind = RefusalKind.OTHER,
     ) -> None:
         self.kind = kind
-        self.reason = _LONG_WORD.sub(r"\1…", reason)
+        self.reason = _LONG_WORD.sub(r"\1…", unquoted(reason))
         super().__init__(self.reason)
-        self.unknown = tuple(dict.fromkeys(_LONG_WORD.sub(r"\1…", word) for word in unknown))
+        self.unknown = tuple(dict.fromkeys(_LONG_WORD.sub(r"\1…", unquoted(word)) for word in unknown))
         if question is True:
             heard = next(iter(self.unknown), None)
             slot = Slot.GOAL if heard is None else Slot.PLACE if heard == _THERE else Slot.THING

@@ -30,18 +30,11 @@ def spoken_tasks() -> tuple[Task, ...]:
 
 
 @cache
-def task_openers(about: Part | None = None) -> frozenset[str]:
-    """Words with which requests for tasks begin, or for those whose object is of a kind."""
+def task_openers(about: Part | None = None, *, templates: bool = False) -> frozenset[str]:
+    """Words with which requests for tasks begin, or for those whose object is of a kind, or by templates alone."""
     tasks = [task for task in installed_tasks().values() if about in (None, task.object_is)]
     firsts = {first for task in spoken_tasks() if task in tasks for first in _page().first_words(task.word)}
-    return frozenset(firsts.union(*(task.verbs for task in tasks)))
-
-
-@cache
-def timed_openers() -> frozenset[str]:
-    """Words with which requests for tasks begin, without tasks that take a text, of which a time may be a part."""
-    others = frozenset[str]().union(*(task_openers(part) for part in Part if part is not Part.TEXT))
-    return others - task_openers(Part.TEXT)
+    return frozenset(firsts.union(*(task.verbs for task in tasks if not templates)))
 
 
 @cache
@@ -75,6 +68,9 @@ def _fault(task: Task, template: str, samples: Iterable[str]) -> str:
             return f"the task has no part '{part}' for a slot"
         if kind not in ("", "number", *page.table["lists"]):
             return f"there is no list '{kind}'"
+        its = parts[part].value
+        if kind in {each.value for each in Part} - {its, "room" if its == "place" else its}:
+            return f"'{{{kind}:{part}}}' fills a part that is a {its}"
     try:
         if not page.first_words(task.word):
             return "it begins with no certain words"

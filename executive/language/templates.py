@@ -250,13 +250,15 @@ def _firsts(parts: Sequence[_Part]) -> frozenset[str] | None:
     return None if None in firsts else frozenset(word for first in firsts for word in first or ())
 
 
-def _kept(name: str, part: _Part, instead: Mapping[str, str] | None = None) -> _Part:
-    """Part whose text is kept in a slot, or another text for it."""
+def _kept(said: str, part: _Part, instead: Mapping[str, str] | None = None) -> _Part:
+    """Part whose text, or another text for it, is kept in a slot, by the slot's name, and by its list with the name."""
+    name = said.rpartition(":")[2]
 
     def ends(words: Words, at: int) -> _Ends:
         for end, slots in part.ends_at(words, at):
             text = words.text[words.start(at) : words.spans[end - 1][1]]
-            yield end, ((name, (instead or {}).get(text.lower(), text)), *slots)
+            text = (instead or {}).get(text.lower(), text)
+            yield end, ((name, text), (said, text), *slots)
 
     return part._replace(ends=ends)
 
@@ -316,8 +318,7 @@ def _part(part: str, parts: list[str], page: Page) -> _Part:
 
 def _slot(said: str, page: Page) -> _Part:
     """Slot `said`, or `list:slot`; a list without values takes any words."""
-    name, _, slot = said.partition(":")
-    kept = partial(_kept, slot or name)
+    name, kept = said.partition(":")[0], partial(_kept, said)
     match page.table["lists"].get(name, {}):
         case _ if name == "number":
             return kept(_Part(_number))

@@ -16,9 +16,10 @@ from pydantic import TypeAdapter
 from executive.language.amounts import parse_seconds
 from executive.language.lexicon import any_of, expression, lexicon, read_table
 from executive.language.nouns import NounKind
-from executive.language.task_sentences import task_forms, task_openers, timed_openers, verb_forms
+from executive.language.task_sentences import task_forms, task_openers, verb_forms
 from executive.words.command import is_attribute, may_be_attribute
 from executive.words.knowledge import Knowledge
+from executive.words.task import Part
 from skills.class_forms import NON, known_attributes
 
 
@@ -233,18 +234,18 @@ def _filled(pattern: str) -> str:
 
 @cache
 def _phrases(name: str) -> str:
-    parts = read_table("rephrasing.yaml")["parts"]
+    parts, timed = read_table("rephrasing.yaml")["parts"], task_openers() - task_openers(Part.TEXT)
     given = {
         "verbs": (first for first, *rest in lexicon().verbs if not rest),
         "tasks": task_openers(),
-        "timed_tasks": timed_openers(),
+        "timed_tasks": timed,
         "acts": _acts(),
     }
     if name in parts:
         said = _filled(expression(parts[name]))
     else:
         said = any_of(given[name] if name in given else read_table("words.yaml")[name]) or "(?!)"
-    own = any_of(timed_openers()) if name in ("verbs", "handles") else ""
+    own = any_of(timed) if name in ("verbs", "handles") else ""
     return f"(?:{said}|{own})" if own else said
 
 

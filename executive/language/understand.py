@@ -9,6 +9,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any, Final
 
 from executive.language.cleaning import clean, foreign_reason, placeholder, strip_wake, unkept_reason
+from executive.language.lexicon import unquoted
 from executive.language.parser import DependencyParser
 from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, RefusalKind, insert_answer
@@ -133,7 +134,8 @@ def understand(
     "it" and "there". With `correct`, misspelled names are corrected when that is safe.
     """
     name = robot_name or (knowledge.robot.name if knowledge else "robot")
-    called = strip_wake(clean(sentence), name, knowledge.robot.others if knowledge else ())
+    text = clean(sentence) if knowledge else unquoted(clean(sentence))
+    called = strip_wake(text, name, knowledge.robot.others if knowledge else ())
     addressed = called.name == name
     if called.name not in (None, name) and knowledge is not None:
         reason = f"it is said to {called.name}, and this robot is {name}"
@@ -194,17 +196,15 @@ def meaning(said: Trace, pipeline: Pipeline, clauses: Sequence[Clause] | None = 
 
 
 def _of_trace(trace: Trace) -> Understanding:
-    refusal = trace.refusal
-    found = Understanding(trace.text, Status.OK, notes=trace.notes, trace=trace)
+    refusal, text = trace.refusal, unquoted(trace.text)
+    found = Understanding(text, Status.OK, notes=tuple(map(unquoted, trace.notes)), trace=trace)
     if refusal is None:
         return replace(found, commands=trace.commands, memory=trace.memory, steps=trace.steps)
-    lost = " ".join((*refusal.unknown, (refusal.question and refusal.question.heard) or ""))
-    reason = unkept_reason(trace.text, lost)
-    question = refusal.question if reason is None else None
-    if reason is None:
-        reason = foreign_reason(trace.text) or refusal.reason
-        reason = reason if question else requote(reason, trace.text)
+    unkept = unkept_reason(text, " ".join((*refusal.unknown, (refusal.question and refusal.question.heard) or "")))
+    question = refusal.question if unkept is None else None
     status = Status.QUESTION if question else Status.REFUSED
+    reason = unkept or foreign_reason(text) or refusal.reason
+    reason = reason if question or unkept else requote(reason, text)
     return replace(found, status=status, reason=reason, unknown_words=refusal.unknown, question=question)
 
 

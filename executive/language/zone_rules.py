@@ -131,9 +131,8 @@ def _rest(text: str, rule: Match, start: int, first: int) -> str | None:
         behind = joint.after
     rest = text[words.start(behind) :]
     asks = words.words[behind - 1 : behind + 1] in (["and", "if"], ["but", "if"])
-    if _PAGE["depends"].search(sentence) or _PAGE["speaks"].search(sentence):
-        return None
-    if not (words.word(end) in _ENDS or asks or begins_action(rest)):
+    apart = words.word(end) in _ENDS or asks or begins_action(rest)
+    if not apart or _PAGE["depends"].search(sentence) or _PAGE["speaks"].search(sentence):
         return None
     if not rest or not begin:
         return begin or rest
@@ -157,18 +156,12 @@ def _facts(kind: ZoneKind, match: Match, room: str) -> ZoneFacts:
 
 def _without(knowledge: Knowledge, rooms: Collection[str]) -> Knowledge:
     """Knowledge in which no objects are usually in these rooms."""
-    if not rooms:
-        return knowledge
 
     def is_open(place: str) -> bool:
         return knowledge.room(place) not in rooms
 
-    things = {
-        name: facts.model_copy(update={"usual": tuple(filter(is_open, facts.usual))})
-        for name, facts in knowledge.things.items()
-    }
-    defaults = {
-        task: {word: place for word, place in table.items() if is_open(place)}
-        for task, table in knowledge.defaults.items()
-    }
+    usual = {name: {"usual": (*filter(is_open, facts.usual),)} for name, facts in knowledge.things.items()}
+    things = {name: facts.model_copy(update=usual[name]) for name, facts in knowledge.things.items()}
+    tables = knowledge.defaults.items()
+    defaults = {task: {word: place for word, place in table.items() if is_open(place)} for task, table in tables}
     return knowledge.model_copy(update={"things": things, "defaults": defaults})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Annotated, Any, Final
 
 from executive.words.forms import Option
@@ -52,15 +52,9 @@ class Scenario:
 
     def merge(self, other: Scenario) -> Scenario:
         """Combines two scenarios into one."""
-        return Scenario(
-            (*self.faults, *other.faults),
-            self.random + other.random,
-            {**self.people, **other.people},
-            (*self.doors, *other.doors),
-            (*self.moves, *other.moves),
-            {**self.answers, **other.answers},
-            self.crowd + other.crowd,
-        )
+        pairs = ((getattr(self, each.name), getattr(other, each.name)) for each in fields(self))
+        both: list[Any] = [{**one, **more} if isinstance(one, Mapping) else one + more for one, more in pairs]
+        return Scenario(*both)
 
     def with_drawn(self, faults: tuple[str, ...]) -> Scenario:
         """Copies the scenario with drawn faults instead of a number of random faults."""

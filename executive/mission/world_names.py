@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from executive.words.command import SPEAKER, START, Command
-from executive.words.knowledge import ANYBODY, EVERYTHING, Knowledge
+from executive.words.command import START, Command
+from executive.words.knowledge import EVERYTHING, Knowledge
 from executive.words.task import Part
 from skills.api import ObjectKind
 from skills.inputs.errors import listing, suggestion
@@ -60,18 +60,17 @@ def _wrong_with_task(command: Command, knowledge: Knowledge) -> Iterator[tuple[s
     whom, task = command.object, command.task
     if task is None:
         return
-    person = whom if task.object_is is Part.PERSON else None
-    if person and person.name != SPEAKER and (person.attributes or knowledge.somebody(person.name) is None):
-        known = (ANYBODY, SPEAKER, *knowledge.people)
-        yield "object", f"unknown person {str(person)!r}", suggestion(person.name, known, shown=known)
+    parts = {"to": (command.goal, task.goal_is), "object": (whom and str(whom), task.object_is)}
+    for key, (name, kind) in parts.items():
+        known = () if (key, kind) == ("to", Part.PLACE) else knowledge.named(kind)
+        if known and name and (key, name) != ("to", START) and (_goal(name, knowledge) or name) not in known:
+            yield key, f"unknown {kind.value} {name!r}", suggestion(name, knowledge.spellings(known), shown=known)
     if whom is not None and task.object_is in (Part.TIME, Part.NUMBER) and command.amount is None:
         yield "object", f"'{whom}' is no {task.object_is.value}", 'write it in digits, as in "3" or "10 second"'
-    if whom is not None and task.object_is is Part.PLACE and knowledge.place(str(whom)) is None:
-        yield "object", f"unknown place '{whom}'", suggestion(str(whom), knowledge.place_names())
     if command.item is not None and task.item_is is Part.NOTHING:
         hint = "take it there in a step of its own"
         yield "take", f"the {command.item} cannot be taken along by '{task.word}'", hint
-    if person is not None and not task.several and command.object_count != 1:
+    if command.about_person and not task.several and command.object_count != 1:
         yield "object", f"it cannot {task.word} several people at a time", "name one person"
     if task.needs_goal and command.goal is None:
         what = task.word if whom is None else f"{task.word} {whom}"
@@ -81,9 +80,12 @@ def _wrong_with_task(command: Command, knowledge: Knowledge) -> Iterator[tuple[s
 def in_world_names(command: Command, knowledge: Knowledge) -> Command:
     """Replaces the names in a command by the world's own names."""
 
-    def named(item: ObjectKind | None) -> ObjectKind | None:
-        known = item and (knowledge.object_name(item.name) or knowledge.somebody(item.name))
-        return item and ObjectKind(known or item.name, item.attributes, related(item.relations))
+    def named(item: ObjectKind | None, kind: Part = Part.THING) -> ObjectKind | None:
+        if item is None or kind in (Part.TEXT, Part.NUMBER):
+            return item
+        known = knowledge.object_name(item.name) or knowledge.somebody(item.name)
+        known = knowledge.place(item.name) if kind in (Part.PLACE, Part.ROOM) else known
+        return ObjectKind(known or item.name, item.attributes, related(item.relations))
 
     def related(relations: tuple[Relation, ...]) -> tuple[Relation, ...]:
         names = ([replace(one, name=_landmark(one.name, knowledge)) for one in each.landmarks] for each in relations)
@@ -94,7 +96,7 @@ def in_world_names(command: Command, knowledge: Knowledge) -> Command:
         goal=command.goal and _goal(command.goal, knowledge),
         goal_at=command.goal_at and knowledge.place(command.goal_at),
         task=command.task,
-        object=named(command.object),
+        object=named(command.object, command.task.object_is if command.task else Part.THING),
         item_count=command.item_count,
         object_count=command.object_count,
         goal_relations=related(command.goal_relations),

@@ -11,10 +11,10 @@ from typing import Annotated, Any, Final
 
 from pydantic import Field, model_validator
 
-from executive.words.command import NUMBERS, START
+from executive.words.command import NUMBERS, SPEAKER, START
 from executive.words.outlines import Corner, Polygon, distance_m, unless_near
 from executive.words.robot_config import RobotsFile, check_name
-from executive.words.task import Task, basic, installed_tasks
+from executive.words.task import Part, Task, basic, installed_tasks
 from executive.words.zone import ZoneFacts, with_files
 from skills.api import Surface, Tag, Zone
 from skills.class_forms import ANY_OBJECT, class_forms
@@ -251,6 +251,11 @@ class Knowledge(Strict):
     def somebody(self, name: str) -> str | None:
         """Name in the file of the person that `name` means; `ANYBODY` for any person, None for an unknown name."""
         return self.person(name) or (ANYBODY if name.lower() == ANYBODY else None)
+
+    def named(self, kind: Part) -> tuple[str, ...]:
+        """Names of the people, rooms or places that a part of a task may be; none for another kind of part."""
+        people = (ANYBODY, SPEAKER, *self.people)
+        return {Part.PERSON: people, Part.ROOM: (*self.rooms,), Part.PLACE: self.place_names()}.get(kind, ())
 
     def rooms_to_search(self, person: str, place: str | None) -> tuple[str, ...]:
         """Rooms in which to look for a person: the place's room, or all rooms, the person's usual room first."""

@@ -160,15 +160,9 @@ def robots_of_file(
             check_kind(robot.kind, kinds)
         except InputError as error:
             raise InputError.at(line, error.message, hint=error.hint) from error
-        stack = None if robot.stack is None else Path(robot.stack)
-        found[name] = RobotConfig(
-            display_name(name),
-            robot.kind,
-            None if robot.at is None else Pose2D(*robot.at),
-            robot.dock,
-            stack if stack is None or source is None else source.path.parent / stack,
-            line,
-        )
+        start = None if robot.at is None else Pose2D(*robot.at)
+        stack = None if robot.stack is None else (Path() if source is None else source.path.parent) / robot.stack
+        found[name] = RobotConfig(display_name(name), robot.kind, start, robot.dock, stack, line)
     return tuple(found.values())
 
 
@@ -176,9 +170,8 @@ def parse_pose(words: Sequence[str]) -> Pose2D:
     """Parses three words as a pose: x and y (m) and the heading (rad). Raises QuantityError."""
     named = (("x", Coordinate), ("y", Coordinate), ("the heading", Angle))
     if len(words) != len(named):
-        raise QuantityError(
-            f"a pose has 3 numbers, not {len(words)}", "give x and y in metres and the heading in radians"
-        )
+        how = "give x and y in metres and the heading in radians"
+        raise QuantityError(f"a pose has 3 numbers, not {len(words)}", how)
     numbers = []
     for word, (name, hint) in zip(words, named, strict=True):
         try:

@@ -32,6 +32,7 @@ class Part(enum.Enum):
     THING = "thing"
     PERSON = "person"
     PLACE = "place"
+    ROOM = "room"
     TIME = "time"
     NUMBER = "number"
     TEXT = "text"

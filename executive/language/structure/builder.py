@@ -18,7 +18,7 @@ from executive.words.leaf_steps import Awaited, Do, Speak, Wait
 from executive.words.step import OnFailure, Step
 from executive.words.steps import Choose, Group, Loop, Repeat, Steps, Together, Try
 
-_ROUNDS: Final = (Cue.EVERY, Cue.TIMES, Cue.WHILE, Cue.UNTIL)
+ROUNDS: Final = (Cue.EVERY, Cue.TIMES, Cue.WHILE, Cue.UNTIL)
 """Cues of repeated actions."""
 _HOW_OFTEN: Final = "I do not understand how often: '{} {}'"
 
@@ -166,7 +166,7 @@ class Builder:
 
     def _lead(self, clause: Clause) -> None:
         """Builds a clause with a cue before its action: "if", "as soon as", "every ten minutes"."""
-        end = end_of_scope(self.clauses, self.at, rounds=clause.kind in _ROUNDS)
+        end = end_of_scope(self.clauses, self.at, rounds=clause.kind in ROUNDS)
         follows = self.clauses[self.at : end]
         if clause.kind in (Cue.IF, Cue.UNLESS) and self._stands_behind(clause, follows):
             return
@@ -304,7 +304,7 @@ class Builder:
 
     def _read(self, cue: Clause, state: State) -> SpokenCondition | Rounds:
         """Condition, or rounds, of a cue and its words: "three times", "every hour for a day", "until it is open"."""
-        if cue.kind not in _ROUNDS:
+        if cue.kind not in ROUNDS:
             return parse_condition(cue.text, state, self.reader)
         every_s = parse_seconds(cue.amount)
         times, what = _times(cue, every_s), "number of times" if cue.kind is Cue.TIMES else "time"
@@ -349,7 +349,7 @@ class Builder:
             self._put_together(cue.text[under_way.end :], scope)
             return
         steps, state = self._inner(scope, before, self.statement).build()  # "if there is one", "until there are none"
-        head = self._read(cue, state if cue.kind in _ROUNDS else replace(state, goal=before.goal, at=before.at))
+        head = self._read(cue, state if cue.kind in ROUNDS else replace(state, goal=before.goal, at=before.at))
         noted = before.noting(head.holds.notes)
         if isinstance(head, Rounds):
             self._put_rounds(replace(head, holds=noted), scope)
@@ -391,11 +391,8 @@ def _times(cue: Clause, every_s: float | None) -> int | None:
 def _only_goes(steps: Steps) -> bool:
     """Returns whether steps only go to one place, or charge."""
     commands = [command for step in steps for command in step.commands if isinstance(step, Do)]
-    return (
-        len(steps) == len(commands) == 1
-        and not commands[0].item
-        and (commands[0].task is None or commands[0].task.docks)
-    )
+    only = commands[0] if len(steps) == len(commands) == 1 else None
+    return only is not None and not only.item and (only.task is None or only.task.docks)
 
 
 def _repeat(loop: Loop, steps: Steps) -> Steps:

@@ -11,7 +11,7 @@ from typing import Any, Final, TypeVar
 
 from executive.language.clauses import CLAUSES
 from executive.language.items import Adverb, Chunk, Item, Whether, verb
-from executive.language.lexicon import VerbKind, lexicon, word_list
+from executive.language.lexicon import VerbKind, lexicon, unquoted, word_list
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.pipeline import Pipeline, Trace
@@ -48,6 +48,13 @@ def require(given: T | None, reason: str, *unknown: str, **how: Any) -> T:
     if not given:
         raise RefusalError(reason, unknown, **how)
     return given
+
+
+def words_to_say(text: str) -> str:
+    """Words of a text, with those of a quotation. Raises RefusalError for other words beside a quotation."""
+    said, whole = unquoted(text), " " not in text.strip()
+    require(whole or said == text, f"there are words beside the quotation in '{said}'; leave them out", said)
+    return said
 
 
 @dataclass(frozen=True)

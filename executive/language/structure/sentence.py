@@ -4,7 +4,7 @@ import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from itertools import dropwhile
 from typing import Final
 
@@ -12,15 +12,17 @@ from pydantic import ValidationError
 
 from executive.language.amounts import parse_seconds
 from executive.language.clauses import CHECKS, Clause, Cue, begins_as, cut, split, trailing_cue
+from executive.language.cleaning import unkept_reason
 from executive.language.coverage import note_adverbs
 from executive.language.items import verb, without_objects
+from executive.language.lexicon import unquoted
 from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import ClarifyingQuestion, RefusalError, RefusalKind, Slot
 from executive.language.reference import Memory
 from executive.language.roles import Location
-from executive.language.structure.builder import Builder, is_paced
+from executive.language.structure.builder import ROUNDS, Builder, is_paced
 from executive.language.structure.conditions import REQUESTS, parse_condition, statement_of_check
-from executive.language.structure.plain import PlainReader, PlainReading, State, T, attempt, require
+from executive.language.structure.plain import PlainReader, PlainReading, State, T, attempt, require, words_to_say
 from executive.language.structure.speaking import ROOMS, SPEECH, say_in_each_room, says
 from executive.language.task_sentences import task_again, task_openers, task_requests
 from executive.language.templates import Match, words_of
@@ -32,7 +34,7 @@ from executive.words.step import Step
 from executive.words.steps import Ask, Choose, Repeat, Together, Try
 from executive.words.task import Part, Task
 from skills.api import ObjectKind
-from skills.inputs.errors import listing
+from skills.inputs.errors import known_names, listing
 from skills.inputs.plugins import SENTENCES, PluginDefect, installed_plugins, run_plugin
 from skills.inputs.schema import first_error
 
@@ -40,8 +42,11 @@ MOST_NESTED: Final = 2
 MOST_CLAUSES: Final = 24
 
 
-def act(row: Builder, clause: Clause) -> None:
-    """Adds the steps of a clause with an action, and of the clauses that belong to it; plain words stay pending."""
+def act(row: Builder, clause: Clause, *, pages: bool = True) -> None:
+    """Adds the steps of a clause with an action, and of the clauses that belong to it; plain words stay pending.
+
+    Without `pages` no clause is a request of a task's page.
+    """
     text, given = clause.text, row.given
     stated = bool(row.plain) and all(begins_as(one.text, "told_first", "pronoun") for one in row.plain)
     if clause.begins and not stated:  # unless it goes on with "there is a hammer on the bench. bring it"
@@ -51,7 +56,12 @@ def act(row: Builder, clause: Clause) -> None:
         clause = replace(clause, lead=without_objects(row.reader.read_items(given)))
     if begins_as(text, "brings", "giving"):
         row.given = text if (behind := trailing_cue(text)) is None else behind.before
-    if not any(does(row, clause) for does in _ACTS):
+    if (keeps := CHECKS["keeps"].fullmatch(text)) is not None:  # "keep sweeping", which was reworded
+        clause, cue = replace(clause, text=keeps["what"], joint=". "), trailing_cue(text)
+        if cue is None or cue.kind not in ROUNDS:
+            row.modify(clause, Clause("", "", Cue.EVERY, "keep", before=clause.text, amount="1 second"))
+            return
+    if not any(does(row, clause) for does in _ACTS if pages or does is not _does_task):
         row.plain.append(clause)
 
 
@@ -106,18 +116,22 @@ def _people_at(group: Location, who: str, state: State, reader: PlainReader) -> 
 
 
 def _does_task(row: Builder, clause: Clause) -> bool:
-    """Adds a request that a sentence on the page of a task matches."""
+    """Adds a request that a sentence on the page of a task matches, unless Errand reads it without pages."""
+    if task_openers().isdisjoint(words_of(clause.text).words):
+        return False
     found = trailing_cue(clause.text)
     begun = found is None or any(one.slots for one in task_requests(found.before).values())
     if found is not None and not begun and found.kind in (Cue.EVERY, Cue.TIMES) and found.text:
         found = replace(found, before=f"{found.before} {found.text}", text="")  # "vacuum twice in the hall"
     text = clause.text if found is None else found.before
+    if any(_reads_without_pages(row, replace(clause, text=each)) for each in {clause.text, text}):
+        return False
     again, first = task_again(text), not (row.steps or row.plain)
     if found is not None and (again or task_requests(text)):
         require(not again, f"it is not clear which action '{found.cue}' belongs to; say it first", found.cue)
         row.modify(clause, found)
         return True
-    parts = [each for one in again or [text] * first for each in cut(smooth(one))] if task_openers() else []
+    parts = [each for one in again or [text] * first for each in cut(smooth(one))]
     if found is None and len(parts) > 1 and (again or task_requests(parts[-1].text)):
         row.insert(parts)
         return True
@@ -130,6 +144,13 @@ def _does_task(row: Builder, clause: Clause) -> bool:
     commands, state = _task_commands(task, match, row.state, row.reader)
     row.put(steps_of_commands(commands), row.reader.state_after(commands, state.memory, state))
     return True
+
+
+def _reads_without_pages(row: Builder, clause: Clause) -> bool:
+    """Returns whether a clause has a meaning, or needs an answer, where no task has sentences of its own."""
+    alone = Builder(row.reader, partial(act, pages=False), [clause], row.state, row.statement, row.given)
+    read = attempt(alone.build)
+    return not isinstance(read, RefusalError) or read.question is not None
 
 
 def _does_more(row: Builder, clause: Clause) -> bool:
@@ -149,12 +170,12 @@ def _own_acts() -> tuple[Callable[[Builder, Clause], bool], ...]:
 
 def _task_commands(task: Task, match: Match, state: State, reader: PlainReader) -> tuple[list[Command], State]:
     """Commands of a request for a task, one for each of its places or objects, with the state that knows them."""
-    said, what, goals = match.text, match["object"], [Command()]
+    said, what, goals = unquoted(match.text), match["object"], [Command()]
+    names = (match[part] for part, kind in (("goal", task.goal_is), ("object", task.object_is)) if kind in _NAMES)
+    unkept = filter(None, (unkept_reason(said, said, task.unkept), *(unkept_reason(each, each) for each in names)))
+    require(not (why := next(unkept, "")), why, said)
     if match["goal"]:
-        there = reader.go_to(match["goal"], state)
-        state, goals = there.state, [one for one in there.commands if one.goal is not None]
-        people = [one.goal for one in goals if one.goal in reader.knowledge.people]
-        require(task.goal_is is not Part.PLACE or not people, f"'{said}': {listing(people)} is no place", match["goal"])
+        state, goals = _at_kind(task.goal_is, match, "goal", state, reader)
     _ask_for(any(at.goal for at in goals) or not task.needs_goal, f"{said}: where?", Slot.PLACE)
     match task.object_is:
         case Part.NOTHING:
@@ -168,16 +189,41 @@ def _task_commands(task: Task, match: Match, state: State, reader: PlainReader) 
             one = task.several or all(each.object_count == 1 for each in objects)
             require(one, f"'{said}' is for one object at a time; say how often, as in 'twice'", wanted)
             require(objects[1:] or wanted.lower() != "them", f"which objects are '{wanted}'? Name each", wanted)
-        case Part.PERSON:
-            person = SPEAKER if what.lower() in ("", "me", "us") else reader.knowledge.person(what)
-            objects = [Command(object=ObjectKind(require(person, f"I know nobody called '{what}'", what)))]
+        case Part.PERSON if what.lower() in ("", "me", "us"):
+            objects = [Command(object=ObjectKind(SPEAKER))]
+        case Part.PERSON | Part.PLACE | Part.ROOM:
+            _ask_for(what, f"{said}: where?", Slot.PLACE)
+            state, found = _at_kind(task.object_is, match, "object", state, reader)
+            objects = [Command(object=ObjectKind(str(one.goal)), goal=one.goal_at) for one in found]
         case Part.TIME:
             seconds = _ask_for(parse_seconds(what), f"{said}: for how long?", Slot.THING)
             objects = [Command(object=ObjectKind("second"), object_count=round(seconds))]
         case _:
-            objects = [Command(object=ObjectKind(_ask_for(what, f"{said}: what?", Slot.THING)))]
+            words = _ask_for(what, f"{said}: what?", Slot.THING)
+            objects = [Command(object=ObjectKind(words_to_say(words).strip("'")))]
     doing, each = said.split(maxsplit=1)[0].lower(), [(at if at.goal else one, one) for at in goals for one in objects]
     return [replace(one, goal=at.goal, goal_at=at.goal_at, task=task, verb=doing) for at, one in each], state
+
+
+_NAMES: Final = (Part.THING, Part.PERSON, Part.PLACE, Part.ROOM)
+
+
+def _at_kind(kind: Part, match: Match, slot: str, state: State, reader: PlainReader) -> tuple[State, list[Command]]:
+    """Commands of going to the places or people that a slot names, with the state that knows them.
+
+    Raises RefusalError for a name of another kind: the slot's list may be narrower than the part's `kind`.
+    """
+    words, knowledge = match[slot], reader.knowledge
+    there = attempt(reader.go_to, words, state)
+    if isinstance(there, RefusalError):
+        nobody = RefusalError(f"I know nobody called '{words}'; {known_names(words, knowledge.people)}", [words])
+        raise nobody if kind is Part.PERSON and there.question is None else there
+    kind = Part.ROOM if match[f"{Part.ROOM.value}:{slot}"] else kind
+    found = [one for one in there.commands if one.goal is not None]
+    known = (*knowledge.named(kind), *[START] * (slot == "goal"))
+    wrong = [str(one.goal) for one in found if one.goal not in known]
+    require(not wrong, f"'{match.text}': {words if found[1:] == [] else listing(wrong)} is no {kind.value}", words)
+    return there.state, found
 
 
 def _ask_for(given: T | None, asked: str, slot: Slot) -> T:
@@ -249,17 +295,7 @@ def _searches_rooms(row: Builder, clause: Clause) -> bool:
     return True
 
 
-_ACTS: Final = (
-    _skips,
-    _does_task,
-    _does_more,
-    _requests,
-    says,
-    _checks,
-    _is_modified,
-    _brings_to_all,
-    _searches_rooms,
-)
+_ACTS: Final = (_skips, _does_task, _does_more, _requests, says, _checks, _is_modified, _brings_to_all, _searches_rooms)
 """Actions in the order of trying."""
 
 

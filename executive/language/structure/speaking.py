@@ -13,7 +13,7 @@ from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
 from executive.language.structure.builder import Builder
 from executive.language.structure.conditions import parse_condition
-from executive.language.structure.plain import PlainReader, attempt, require
+from executive.language.structure.plain import PlainReader, attempt, require, words_to_say
 from executive.language.templates import Match, page, words_of
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Speak
@@ -130,9 +130,9 @@ def refuse_stranger(text: str, knowledge: Knowledge) -> None:
 
 def _words(match: Match, intent: str, parser: DependencyParser) -> str:
     """Words to say; none of "let Robin know it". Raises RefusalError for words that mean something else when said."""
-    said = f"{match['polite']}{match['text']}"
-    if not said:
-        return said
+    said = words_to_say(text := f"{match['polite']}{match['text']}")
+    if not said or said != text:
+        return said  # words in quotes are these words, whatever they mean
     clause = intent != "tells" and is_clause(said, parser)
     nothing = SPEECH["nothing"].fullmatch(said) is not None
     if intent in ("says_to", "says"):

@@ -20,9 +20,12 @@ from executive.language.task_sentences import (
 from executive.language.understand import Status, understand
 from executive.words import task
 from executive.words.steps import steps_from_yaml, steps_to_yaml
+from executive.words.task import Part
 from skills.inputs.yaml_source import yaml_of
 from tests.executive.distribution import module_of_a_plug_in
-from tests.executive.house_tasks import Vacuum, tasks_installed
+from tests.executive.house_tasks import Call, Cheer, Sweep, Vacuum, Water, tasks_installed
+from tests.missions.own_tasks.read_number import ReadNumber
+from tests.missions.own_tasks.water import Water as WaterObject
 from tests.tables import yaml_beside
 
 
@@ -386,6 +389,7 @@ def test_forms_of_verbs(verb, forms):
         ("mop {place:where}", "mop the hall", "the task has no part 'where' for a slot"),
         ("mop {thing:object}", "mop the cube", "the task has no part 'object' for a slot"),
         ("mop {banana:goal}", "mop the hall", "there is no list 'banana'"),
+        ("mop {person:goal}", "mop Robin", "'{person:goal}' fills a part that is a place"),
         ("{place:goal}", "the hall", "it begins with no certain words"),
         ("mop {place:goal}", "fly away", "the sample 'fly away' does not match it"),
     ],
@@ -399,6 +403,95 @@ def test_a_template_that_cannot_be_read_is_named_and_takes_part_in_no_sentence(
     assert [*sentence_faults(mop())] == ([] if fault is None else [f"the template '{template}': {fault}"])
     assert (mop() in spoken_tasks()) is (fault is None)
     assert written("vacuum the kitchen", parser, knowledge) == "- {to: kitchen, do: vacuum}"
+
+
+class Give(Vacuum):
+    """Gives an object."""
+
+    word, object_is, goal_is, needs_goal = "give", Part.THING, Part.NOTHING, False
+    sentences = ({"template": "(bring|fetch) me {thing:object}", "samples": ["bring me a beer"]},)
+
+
+class Announce(Call):
+    """Announces a text."""
+
+    word, sentences = "announce", ({"template": "announce {text:object}", "samples": ["announce dinner"]},)
+
+
+class Spell(Call):
+    """Spells a text."""
+
+    word, sentences = "spell", ({"template": "spell [:] {text:object}", "samples": ["spell hello"]},)
+    unkept = ({"said": r"(?<=spell )[\w, ]+ backwards", "reason": "I spell forwards, and not as in '{}'"},)
+
+
+class Inspect(Vacuum):
+    """Inspects a place."""
+
+    word, object_is, goal_is, needs_goal = "inspect", Part.PLACE, Part.NOTHING, False
+    sentences = ({"template": "inspect [{place:object}]", "samples": ["inspect the hall"]},)
+
+
+class Wave(Vacuum):
+    """Waves at a person."""
+
+    word, goal_is = "wave", Part.PERSON
+    sentences = ({"template": "wave at {person:goal}", "samples": ["wave at Robin"]},)
+
+
+class PolishWet(Water):
+    """Polishes an object with water."""
+
+    word, unkept = "polish", Polish.unkept
+    sentences = ({"template": "polish {thing:object} [with (wax|water)]", "samples": ["polish the hammer"]},)
+
+
+class SweepRoom(Sweep):
+    """Sweeps the floor of a room."""
+
+    goal_is = Part.ROOM
+
+
+PAGES = (Give(), Announce(), Spell(), Inspect(), Wave(), PolishWet(), SweepRoom(), Cheer())
+OWN = yaml_beside(__file__, "task_sentences_own.yaml")
+
+
+@pytest.fixture
+def own_pages():
+    """Installs pages, of which some take words of Errand's own sentences, beside the shipped tasks."""
+    with tasks_installed(*PAGES) as found:
+        yield found
+
+
+@pytest.mark.parametrize("said", OWN["errands"])
+def test_a_page_takes_no_clause_that_errand_reads_without_it(own_pages, parser, flat, said):
+    beside = written(said, parser, flat)
+    with tasks_installed(*(each for each in own_pages.values() if each not in PAGES), beside=False):
+        assert written(said, parser, flat) == beside
+
+
+@pytest.mark.parametrize(
+    ("said", "meant"),
+    [row for rows in ("parts", "quotations", "rounds", "unkept") for row in OWN[rows].items()],
+)
+def test_a_page_has_its_kinds_of_parts_quotations_rounds_and_limits(own_pages, parser, flat, said, meant):
+    understood_or_refused(said, meant, parser, flat)
+
+
+FRESH = yaml_beside(__file__, "task_sentences_fresh.yaml")
+
+
+class VacuumRoom(Vacuum):
+    """Cleans the floor of a room."""
+
+    goal_is = Part.ROOM
+    sentences = ({"template": "(vacuum|hoover) [{room:goal}]", "samples": ["vacuum the kitchen"]},)
+
+
+@pytest.mark.parametrize(("said", "meant"), FRESH.items())
+def test_a_fresh_sentence_with_the_tasks_of_the_tutorial_is_understood_or_refused(parser, flat, said, meant):
+    with tasks_installed(VacuumRoom(), WaterObject(), ReadNumber()):
+        understood_or_refused(said, meant, parser, flat)
 
 
 def test_a_task_for_one_object_refuses_several(house_tasks, parser, knowledge):

@@ -16,7 +16,11 @@ PAGES = sorted(path.stem for path in (TABLES / "intents").glob("*.yaml") if path
 WORLD = {"names": ("Robin", "Maya"), "around": ("office", "kitchen", "hall")}
 GIVEN = {
     "remarks": {"opener": ("vacuum",), "opener_form": ("vacuuming",)},
-    "rewording": {"opener": ("guide", "vacuum"), "opener_form": {"vacuuming": "vacuum"}},
+    "rewording": {
+        "opener": ("guide", "vacuum"),
+        "opener_form": {"vacuuming": "vacuum"},
+        "own_form": {"sweeping": "sweep"},
+    },
     "speech": {**WORLD, "noted": ("slowly",)},
     "clauses": {"asking": tuple(word_list("openers"))},
     "robots": {"one": ("Alice", "Bob"), "verb": ("bring", "brings", "come", "go")},

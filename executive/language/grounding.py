@@ -208,11 +208,9 @@ class _Grounder:
         place, looks = self.knowledge.place(phrase.text), act == "look"
         known = place or self.knowledge.person(phrase.text)
         named = known or {**dict.fromkeys(read_table("relations.yaml")["doors"], DOOR), "you": ROBOT}.get(phrase.text)
-        fits = {
-            **dict.fromkeys(ORDERS, looks),
-            RelationKind.SEEN_FROM: known in self.knowledge.people,
-            RelationKind.NOT_AT: (looks and place is not None) or None,  # or not at an object
-        }.get(said.kind)
+        apart = (looks and place is not None) or None  # or not at an object
+        special = {RelationKind.SEEN_FROM: known in self.knowledge.people, RelationKind.NOT_AT: apart}
+        fits = looks if said.kind in ORDERS else special.get(said.kind)
         if fits and named:
             return Landmark(named)
         other = known or phrase.speaker or phrase.somebody or phrase.addressed or phrase.pronoun

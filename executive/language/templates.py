@@ -90,11 +90,8 @@ class Page:
     @cached_property
     def table(self) -> Mapping[str, Any]:
         """Contents of the page, with the common rules and lists, and the words that are given."""
-        own = (
-            read_table(f"intents/{self._name}.yaml")
-            if self._file is None
-            else plain_yaml(self._file.read_text("utf-8"))
-        )
+        file, name = self._file, f"intents/{self._name}.yaml"
+        own = read_table(name) if file is None else plain_yaml(file.read_text("utf-8"))
         common = read_table("intents/common.yaml")
         lists = {**common["lists"], **own.get("lists", {}), **self._given}
         rules = {**common["rules"], **own.get("rules", {}), **self._rules}

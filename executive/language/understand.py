@@ -146,9 +146,7 @@ def understand(
     if (blank := _blank(sentence, knowledge)) is not None:
         odd = RefusalError(f"{blank!r} is no word; say it in words", [blank])
         return replace(_of_trace(Trace(sentence, refusal=odd, refused_at="cleaning")), addressed=addressed)
-    said = CorrectedText(called.text)
-    if correct and knowledge is not None:
-        said = correct_spelling(called.text, knowledge, parser)
+    said = correct_spelling(called.text, knowledge, parser) if correct and knowledge else CorrectedText(called.text)
     try:
         rules = read_rules(said.text, knowledge)
         found = under_rules(rules, meaning(Trace(rules.rest, memory or Memory()), Pipeline(parser, rules.knowledge)))

@@ -171,7 +171,7 @@ def _own_acts() -> tuple[Callable[[Builder, Clause], bool], ...]:
 def _task_commands(task: Task, match: Match, state: State, reader: PlainReader) -> tuple[list[Command], State]:
     """Commands of a request for a task, one for each of its places or objects, with the state that knows them."""
     said, what, goals = unquoted(match.text), match["object"], [Command()]
-    names = (match[part] for part, kind in (("goal", task.goal_is), ("object", task.object_is)) if kind in _NAMES)
+    names = (match["goal"], "" if task.object_is is Part.TEXT else what)
     unkept = filter(None, (unkept_reason(said, said, task.unkept), *(unkept_reason(each, each) for each in names)))
     require(not (why := next(unkept, "")), why, said)
     if match["goal"]:
@@ -205,20 +205,16 @@ def _task_commands(task: Task, match: Match, state: State, reader: PlainReader) 
     return [replace(one, goal=at.goal, goal_at=at.goal_at, task=task, verb=doing) for at, one in each], state
 
 
-_NAMES: Final = (Part.THING, Part.PERSON, Part.PLACE, Part.ROOM)
-
-
 def _at_kind(kind: Part, match: Match, slot: str, state: State, reader: PlainReader) -> tuple[State, list[Command]]:
     """Commands of going to the places or people that a slot names, with the state that knows them.
 
     Raises RefusalError for a name of another kind: the slot's list may be narrower than the part's `kind`.
     """
-    words, knowledge = match[slot], reader.knowledge
+    words, knowledge, kind = match[slot], reader.knowledge, Part.ROOM if match[f"room:{slot}"] else kind
     there = attempt(reader.go_to, words, state)
     if isinstance(there, RefusalError):
         nobody = RefusalError(f"I know nobody called '{words}'; {known_names(words, knowledge.people)}", [words])
         raise nobody if kind is Part.PERSON and there.question is None else there
-    kind = Part.ROOM if match[f"{Part.ROOM.value}:{slot}"] else kind
     found = [one for one in there.commands if one.goal is not None]
     known = (*knowledge.named(kind), *[START] * (slot == "goal"))
     wrong = [str(one.goal) for one in found if one.goal not in known]

@@ -21,14 +21,7 @@ from executive.words.knowledge import ANYBODY, ANYTHING, Knowledge
 from executive.words.outlines import inside
 from executive.words.task import Part
 from skills.api import Cause, Failed, ObjectKind, Publish, Surface
-from skills.descriptions import (
-    SAME_WITHIN_M,
-    count_of,
-    count_sentence,
-    describe_unknown,
-    distinct_objects,
-    plural,
-)
+from skills.descriptions import SAME_WITHIN_M, count_of, count_sentence, describe_unknown, distinct_objects, plural
 from skills.geometry import compose
 from skills.inputs.errors import listing, with_article
 from skills.robot import Pose2D

@@ -7,6 +7,7 @@ With the Python of `make ros`, two processes and a client with rclpy alone:
 rclpy: COUNT goals of navigate_to_pose of a run, each cancelled under way, and as many that are reached.
 bytes: COUNT random bytes to each input of a run and of a served robot: what moves, and what is said.
 base: COUNT missions with --robot ros2://alice on the base of rclpy_base.py, judged by where it stands at the end.
+fetch: fetch_drink on a served robot with the seeds 1 to COUNT, by its own claim.
 """
 
 import json
@@ -341,8 +342,27 @@ def base(count):
         sys.stdout.write(f"{room}: exit code {ended.returncode}, {off_m:.2f} m from where a robot stands there\n")
 
 
+def fetch(count):
+    from rclpy_client import errand
+
+    place, domain = ("--world", "flat", "--start", *START), DOMAIN + 20
+    for seed in map(str, range(1, count + 1)):
+        served = errand("serve-ros2", f"rclpy:{domain}", *place, "--seed", seed, ready="ROS 2: /alice")
+        with tempfile.TemporaryDirectory() as folder, served as said:
+            run = ["run", "fetch_drink", *place, "--seed", seed, "--no-record", "--quiet", "--out", folder]
+            words = [sys.executable, "-m", "executive.cli", *run, "--robot", f"ros2://alice?network=rclpy:{domain}"]
+            begun_s = time.monotonic()
+            ended = subprocess.run(words, capture_output=True, text=True, timeout=900, check=False)
+        spent_s, lines = time.monotonic() - begun_s, (ended.stdout + ended.stderr).strip().splitlines()
+        wrong = sum("Traceback" in line for line in (*lines, *said))
+        sys.stdout.write(
+            f"seed {seed}: exit code {ended.returncode}, {spent_s:.0f} s, {wrong} tracebacks: {lines[-1]}\n"
+        )
+        sys.stdout.flush()
+
+
 if __name__ == "__main__":
     what, *numbers = sys.argv[1:]
     measures = {"bridge": bridge, "cancel": cancel, "kill": kill, "listen": listen}
-    measures |= {"rclpy": by_rclpy, "bytes": random_bytes, "base": base}
+    measures |= {"rclpy": by_rclpy, "bytes": random_bytes, "base": base, "fetch": fetch}
     measures[what](*map(int, numbers or [60]))

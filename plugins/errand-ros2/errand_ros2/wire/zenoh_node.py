@@ -18,7 +18,7 @@ from zenoh import ext
 
 from errand_ros2.wire import types
 from errand_ros2.wire.node import Client, Delays, Node, Place, Publisher, Request, Session, taken_by_others
-from errand_ros2.wire.types import USUAL, Attachment, MalformedError, MessageType, NodeKey, Qos, ServiceType, ros_types
+from errand_ros2.wire.types import USUAL, Attachment, MessageType, NodeKey, Qos, ServiceType, ros_types
 from skills.inputs.errors import InputError
 
 _CDR: Final = "application/cdr"
@@ -98,7 +98,7 @@ class ZenohClient(Client):
     """Client of a service."""
 
     def __init__(self, node: ZenohNode, name: str, kind: ServiceType) -> None:
-        self._kind, self._key = kind, node.key.data_key(name, kind.key)
+        self._node, self._kind, self._key = node, kind, node.key.data_key(name, kind.key)
         self._gid, self._numbers = node.declare(types.CLIENT, name, kind.key, USUAL), count(1)
         self._session = node.session.inner
 
@@ -124,10 +124,7 @@ class ZenohClient(Client):
 
     def _response(self, reply: zenoh.Reply) -> Any:
         """Returns the response in a reply; None for an error, and for one that cannot be decoded."""
-        try:
-            return None if reply.ok is None else self._kind.response.decode(reply.ok.payload.to_bytes())
-        except MalformedError:
-            return None
+        return None if reply.ok is None else self._node.decoded(self._kind.response, reply.ok.payload.to_bytes())
 
 
 class ZenohNode(Node):

@@ -1,4 +1,4 @@
-"""Figures of the ROS 2 plug-in: `python plugins/errand-ros2/tests/ros2_benchmarks.py NAME [COUNT]`.
+"""Figures of the ROS 2 plug-in: `python plugins/errand-ros2/tests/ros2_benchmarks.py NAME [COUNT [FIRST]]`.
 
 bridge: a run in the flat with one subscription to scan, tf and a picture for COUNT seconds: rates, pace, latency, CPU.
 cancel: COUNT goals of navigate_to_pose, each cancelled under way: time until the base stands.
@@ -7,7 +7,7 @@ With the Python of `make ros`, two processes and a client with rclpy alone:
 rclpy: COUNT goals of navigate_to_pose of a run, each cancelled under way, and as many that are reached.
 bytes: COUNT random bytes to each input of a run and of a served robot: what moves, and what is said.
 base: COUNT missions with --robot ros2://alice on the base of rclpy_base.py, judged by where it stands at the end.
-fetch: fetch_drink on a served robot with the seeds 1 to COUNT, by its own claim.
+fetch: fetch_drink on a served robot with the seeds 1 to COUNT, or from FIRST on, by its own claim.
 """
 
 import json
@@ -342,18 +342,18 @@ def base(count):
         sys.stdout.write(f"{room}: exit code {ended.returncode}, {off_m:.2f} m from where a robot stands there\n")
 
 
-def fetch(count):
+def fetch(count, first=1):
     from rclpy_client import errand
 
     place, domain = ("--world", "flat", "--start", *START), DOMAIN + 20
-    for seed in map(str, range(1, count + 1)):
+    for seed in map(str, range(first, count + 1)):
         served = errand("serve-ros2", f"rclpy:{domain}", *place, "--seed", seed, ready="ROS 2: /alice")
         with tempfile.TemporaryDirectory() as folder, served as said:
             run = ["run", "fetch_drink", *place, "--seed", seed, "--no-record", "--quiet", "--out", folder]
             words = [sys.executable, "-m", "executive.cli", *run, "--robot", f"ros2://alice?network=rclpy:{domain}"]
             begun_s = time.monotonic()
             ended = subprocess.run(words, capture_output=True, text=True, timeout=900, check=False)
-        spent_s, lines = time.monotonic() - begun_s, (ended.stdout + ended.stderr).strip().splitlines()
+        spent_s, lines = time.monotonic() - begun_s, (ended.stderr + ended.stdout).strip().splitlines()
         wrong = sum("Traceback" in line for line in (*lines, *said))
         sys.stdout.write(
             f"seed {seed}: exit code {ended.returncode}, {spent_s:.0f} s, {wrong} tracebacks: {lines[-1]}\n"

@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
+from functools import partial
 from importlib import import_module
 from typing import Any, Final
 
@@ -259,7 +260,8 @@ class RclpyNode(Node):
         subscription = self.inner.create_subscription(
             kind, name, received, _profile(qos), callback_group=self.group, raw=True
         )
-        return lambda: self.inner.destroy_subscription(subscription) and None
+        end, executor = partial(self.inner.destroy_subscription, subscription), self.session.executor
+        return lambda: executor.create_task(end) and None  # in its thread, which may be reading the subscription
 
     def serve(self, name: str, kind: ServiceType, handle: Callable[[Request], None]) -> None:
         """Calls `handle` with each request for a service; it may answer later."""

@@ -31,6 +31,7 @@ from skills.inputs.errors import InputError
 
 _LOG: Final = logging.getLogger(__name__)
 _DISCOVERY_S, _COMPARE_S = 1.0, 2.0  # after which publishers of other nodes are known; period of looking at them
+_ALL_KNOWN_S, _LOOK_S = 4.0, 0.1  # the same after a session began on a busy machine; period of a claim's looks
 
 
 class NotInstalledError(Exception):
@@ -78,7 +79,7 @@ class RclpySession(Session):
 
     def __init__(self, place: Place, context: Context) -> None:
         super().__init__(place, f"domain {place.domain}, rclpy with {get_rmw_implementation_identifier()}")
-        self.context, self.missing = context, set[str]()
+        self.context, self.missing, self.opened_s = context, set[str](), time.monotonic()
         self.executor = SingleThreadedExecutor(context=context)
         self.nodes: list[rclpy.node.Node] = []
         self._beside: RclpySession | None = None
@@ -222,10 +223,12 @@ class RclpyNode(Node):
 
     def claim(self, *topics: str) -> None:
         """Raises InputError when another node publishes one of the topics, which only one may publish."""
-        threading.Event().wait(_DISCOVERY_S)
-        for name in map(self.absolute, topics):
-            if self.inner.get_publishers_info_by_topic(name):
-                raise taken_by_others(name, self.session.place.domain)
+        until_s = max(self.session.opened_s + _ALL_KNOWN_S, time.monotonic() + _DISCOVERY_S)
+        while (left_s := until_s - time.monotonic()) > 0.0:
+            for name in map(self.absolute, topics):
+                if self.inner.get_publishers_info_by_topic(name):
+                    raise taken_by_others(name, self.session.place.domain)
+            threading.Event().wait(min(left_s, _LOOK_S))
 
     def compare_all(self) -> None:
         """Compares the types in which the topics are published that are subscribed to."""

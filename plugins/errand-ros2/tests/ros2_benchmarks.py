@@ -282,6 +282,7 @@ INPUTS = {
 
 def random_bytes(count):
     from rclpy_client import client_of, errand, interface
+    from ros_client import soon
 
     words = ("--world", "flat", "--start", *START)
     run = ("run", "--say", "wait for an hour", *words, "--no-record", "--quiet", "--ros2", f"rclpy:{DOMAIN}")
@@ -289,7 +290,7 @@ def random_bytes(count):
     for command in (run, ("serve-ros2", f"rclpy:{DOMAIN}", *words)):
         with errand(*command, ready="ROS 2: ") as said, client_of(DOMAIN) as client:
             seen, sent = client.hear("/alice/odom", ODOM), 0
-            time.sleep(8.0)
+            assert soon(lambda seen=seen: len(seen) > 40, 120.0)
             begun = seen[-1].pose.pose.position
             for topic, kind in INPUTS.items():
                 out, left = client.node.create_publisher(interface(kind), f"/alice/{topic}", 10), count

@@ -298,7 +298,7 @@ def random_bytes(count):
                 while left > 0 and out.get_subscription_count():
                     data = b"\0\1\0\0" + chance.bytes(int(chance.integers(0, 600)))
                     left -= len(data)
-                    if kind != TWIST or len(data) < 52:  # from there on random bytes are a velocity
+                    if kind != TWIST or len(data) <= 48:  # DDS fills up more to a velocity's 52 bytes
                         with suppress(RuntimeError):  # longer than the type's messages are
                             out.publish(data)
                             sent += 1

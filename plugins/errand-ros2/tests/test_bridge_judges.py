@@ -159,7 +159,7 @@ def test_random_bytes_from_rclpy_on_every_topic_of_a_run_move_nothing(tmp_path, 
         assert soon(lambda: all(each.is_heard for each in senders))
         for sender in senders:
             for number, data in enumerate(
-                chunks(chance, 48 if "cmd_vel" in sender._publisher.topic else 9000, b"\0\1\0\0")
+                chunks(chance, 44 if "cmd_vel" in sender._publisher.topic else 9000, b"\0\1\0\0")
             ):
                 sender._publisher.publish(data)
                 if number % 10 == 0:

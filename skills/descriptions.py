@@ -58,6 +58,8 @@ def plural(name: str) -> str:
     """Plural of a class name; "beer" and "coke" take an s as in "two beers"."""
     if name.endswith(PERSON):
         return f"{name.removesuffix('person')}people"
+    if name.endswith("y") and name[-2:-1] not in "aeiou":
+        return f"{name[:-1]}ies"
     return f"{name}es" if name.endswith(("ch", "sh", "s", "x")) else f"{name}s"
 
 

@@ -1,17 +1,23 @@
-"""Skills of this repository: those of the core, and with them those of errand-people, each with its file of tests."""
+"""Worlds and skills of this repository: those of the core; and the skills of errand-people, each with its tests."""
 
 import sys
 from functools import cache
 from pathlib import Path
 
 from executive.tree.registry import GROUP, SkillClass, skills_of
+from plant.worlds.world import WORLDS_FOLDER
 from skills.inputs.plugins import OURS, distribution_of, installed_plugins
 from tests.sources import ROOT
 
 sys.path.append(str(ROOT / "docs"))
 from file_schemas import project_skills
 
-__all__ = ["core_skills", "project_skills", "skill_tests"]
+__all__ = ["core_skills", "project_skills", "shipped_worlds", "skill_tests"]
+
+
+def shipped_worlds() -> tuple[str, ...]:
+    """Returns the names of the project's own worlds."""
+    return tuple(sorted(path.parent.name for path in WORLDS_FOLDER.glob("*/world.dmd.yaml")))
 
 
 def core_skills() -> dict[str, SkillClass]:

@@ -30,6 +30,7 @@ from executive.tree.port_values import describe_type, field_types
 from executive.words.task import installed_tasks, task_of
 from plant.models.catalogue import load_catalogue
 from plant.robots import robot_kind as kinds
+from plant.worlds.world import load_world
 from skills.class_forms import class_forms
 from skills.inputs import plugins as loading
 from skills.inputs.errors import InputError
@@ -178,6 +179,9 @@ def _load(entry: EntryPoint, limit_s: float) -> None:
         return
     if entry.group == loading.STACKS:
         load_stack(stack_file(Path(entry.name)))
+        return
+    if entry.group == loading.WORLDS:
+        load_world(loading.package_folder(entry) / entry.name)
         return
     load = entry.load if entry.group != COMMANDS_GROUP else lambda: as_command(entry.name, entry.load())
     try:

@@ -9,7 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 from executive.words.command import NUMBERS, SPEAKER, START
 from executive.words.outlines import Corner, Polygon, distance_m, unless_near
@@ -161,6 +161,13 @@ class Knowledge(Strict):
     defaults: dict[str, dict[str, str]] = Field(
         default_factory=dict, description="for a task, the room for each class or category when the request names none"
     )
+
+    _file: Path | None = PrivateAttr(default=None)
+
+    @property
+    def file(self) -> Path | None:
+        """File from which it was loaded, beside which plug-ins find facts of their own; None without a file."""
+        return self._file
 
     def known_tags(self) -> tuple[Tag, ...]:
         """Tags as the skills' own data type."""
@@ -316,10 +323,7 @@ def split_exceptions(name: str) -> tuple[str, ...]:
     return (kept, *left_out.split(" and ")) if left_out else (name,)
 
 
-def _resolve(
-    name: str,
-    group: Mapping[str, Place] | Mapping[str, SurfaceFacts] | Mapping[str, ObjectFacts] | Mapping[str, Person],
-) -> str | None:
+def _resolve(name: str, group: Mapping[str, Place | SurfaceFacts | ObjectFacts | Person]) -> str | None:
     wanted = name.lower()
     own = (known for known in group if known.lower() == wanted)
     alias = (
@@ -333,9 +337,8 @@ def _resolve(
 def load_knowledge(path: Path | str, own: Collection[str] = ()) -> Knowledge:
     """Reads a world's `knowledge.yaml`; `own` are the names of imported objects, which the file may omit.
 
-    Raises:
-        InputError: with file, line and hint, for broken YAML, unknown or missing keys, wrong values, and for names
-            that are not defined or mean two things.
+    Raises InputError, with file, line and hint, for broken YAML, unknown or missing keys, wrong values, and for names
+    that are not defined or mean two things.
     """
     return knowledge_of_source(read_yaml(path), own)
 
@@ -350,7 +353,9 @@ def knowledge_of_source(source: YamlSource, own: Collection[str] = (), below: Kn
         raise error
     found = {} if below is None else below.zones
     zones = {name: z if z == found.get(name) else with_files(source, name, z) for name, z in knowledge.zones.items()}
-    return with_own_objects(knowledge.model_copy(update={"zones": zones}), own)
+    knowledge = knowledge.model_copy(update={"zones": zones})
+    knowledge._file = source.path if below is None else below.file
+    return with_own_objects(knowledge, own)
 
 
 def with_own_objects(knowledge: Knowledge, own: Iterable[str]) -> Knowledge:

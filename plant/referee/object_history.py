@@ -64,12 +64,14 @@ class ObjectHistory(Stateful):
     """History of one object; `add` is called with every sample.
 
     `rests_W` are its resting places, `rested_s` the times at which it came to rest there, `dropped_s` the times of its
-    drops. `sides_m` are its length, width and height. `lost_s` is when it left the world, a fault of the simulation.
+    drops. `sides_m` are its length, width and height, `mass_kg` is its mass. `lost_s` is when it left the world, a
+    fault of the simulation.
     """
 
     name: str
     class_name: str
     sides_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    mass_kg: float = 0.0
     lifts: list[Lift] = field(default_factory=list)
     rests_W: list[FloatArray] = field(default_factory=list)
     rested_s: list[float] = field(default_factory=list)

@@ -80,7 +80,10 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         self._doors = doors
         self._counter = CollisionCounter(self._entities.all)
         classes, sides_m = self._entities.classes, self._entities.sides_m
-        self._histories = {name: ObjectHistory(name, classes[name], sides_m[name]) for name in self._entities.objects}
+        self._histories = {
+            name: ObjectHistory(name, classes[name], sides_m[name], body.default_mass())
+            for name, body in self._entities.objects.items()
+        }
         self._paths: dict[str, list[FloatArray]] = {name: [] for name in robots}
         hand_paths = [path.format(name) for name in self._entities.hands for path in (HAND, HAND_TURN)]
         self._hand_paths: dict[str, list[FloatArray]] = {name: [] for name in hand_paths}

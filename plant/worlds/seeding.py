@@ -230,14 +230,16 @@ def candidates(world: World, surface: SurfaceTop, rng: np.random.Generator) -> I
 def _place_person(world: World, rule: PersonRule, form: ModelForm, seed: int, index: int) -> Placement:
     stream = (seed, _WALK_STREAM, index)
     route = None if rule.route is None else point_route(rule.route, world.standing, stream)
-    if rule.pose is not None:
-        x, y, yaw = rule.pose.x, rule.pose.y, rule.pose.yaw
+    rng = np.random.default_rng([seed, _PEOPLE_STREAM, index])
+    if rule.stands:
+        pose = rule.stands[int(rng.integers(len(rule.stands)))]
+        x, y, yaw = pose.x, pose.y, pose.yaw
     elif rule.ranges is not None:
-        x, y, yaw = _before_start(world, rule.ranges, np.random.default_rng([seed, _PEOPLE_STREAM, index]))
+        x, y, yaw = _before_start(world, rule.ranges, rng)
     else:
         assert route is not None
         (x, y), yaw = route.stops[0].at_W, route.first_yaw_rad
-    if route is not None and (rule.pose or rule.ranges):
+    if route is not None and (rule.stands or rule.ranges):
         route = route.from_pose((x, y), yaw)
     X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([x, y, form.rest_height_m], dtype=np.float64))
     receiving = Receiving(rule.pull_n, rule.reaction_s) if rule.receives else None
@@ -265,8 +267,8 @@ def standing_points_W(world: World) -> FloatArray:
 
 def standing_W(world: World, rule: PersonRule) -> list[Point]:
     """Points where a person may start under any seed: one, or a grid over the person's ranges."""
-    if rule.pose is not None:
-        return [(rule.pose.x, rule.pose.y)]
+    if rule.stands:
+        return [(pose.x, pose.y) for pose in rule.stands]
     if rule.ranges is None:
         assert rule.route is not None
         return [point_route(rule.route, world.standing).stops[0].at_W] if rule.route.waypoints else []

@@ -17,8 +17,9 @@ from plant.models.catalogue import ImportedObject, load_catalogue, read_imported
 from plant.worlds.geometry_files import check_directives, check_model
 from skills.inputs.errors import InputError, nearest_name, suggestion
 from skills.inputs.outside import is_file
+from skills.inputs.plugins import WORLDS, installed_plugins, package_folder
 from skills.inputs.schema import validate
-from skills.inputs.yaml_source import KeyPath, YamlSource, read_yaml
+from skills.inputs.yaml_source import KeyPath, read_yaml
 from skills.robot import Pose2D, quantities
 
 if TYPE_CHECKING:
@@ -81,6 +82,7 @@ class PersonRule(_Strict):
     name: str = Field(description="the person's name in knowledge.yaml")
     model: str = Field(default="person", description="a class of `plant/models/catalogue.yaml`")
     pose: Pose | None = Field(default=None, description="where the person stands, and the direction that they face")
+    poses: tuple[Pose, ...] = Field(default=(), description="poses instead, of which the seed chooses one")
     distance_m: Distances | None = Field(default=None, description="least and greatest distance from the start pose")
     bearing_rad: Angles | None = Field(default=None, description="least and greatest bearing, seen from the start pose")
     turned_rad: Angles | None = Field(default=None, description="least and greatest turn away from facing the robot")
@@ -93,11 +95,16 @@ class PersonRule(_Strict):
     @model_validator(mode="after")
     def _walks_or_stands(self) -> PersonRule:
         given = (self.distance_m, self.bearing_rad, self.turned_rad)
-        if self.pose is not None and given != (None, None, None):
+        if self.stands and given != (None, None, None):
             raise ValueError("'pose' says where the person stands; leave out 'distance_m', 'bearing_rad', 'turned_rad'")
-        if self.route is None and self.pose is None and self.ranges is None:
+        if self.route is None and not self.stands and self.ranges is None:
             raise ValueError("give 'pose', or 'route', or 'distance_m', 'bearing_rad' and 'turned_rad'")
         return self
+
+    @property
+    def stands(self) -> tuple[Pose, ...]:
+        """Poses of which the seed chooses one; a single one where the file has `pose`."""
+        return self.poses if self.pose is None else (self.pose,)
 
     @property
     def ranges(self) -> tuple[Distances, Angles, Angles] | None:
@@ -105,9 +112,6 @@ class PersonRule(_Strict):
         if self.distance_m is None or self.bearing_rad is None or self.turned_rad is None:
             return None
         return self.distance_m, self.bearing_rad, self.turned_rad
-
-
-_MANNERS: Final = ("receives", "pull_n", "reaction_s", "answers")
 
 
 class DoorRule(_Strict):
@@ -212,7 +216,8 @@ class World:
         """
         rules = self.seed_rules
         before = {rule.name: rule for rule in rules.people}
-        manners = {name: rule.model_dump(include={*_MANNERS}) for name, rule in before.items()}
+        kept = {"receives", "pull_n", "reaction_s", "answers"}
+        manners = {name: rule.model_dump(include=kept) for name, rule in before.items()}
         walking = {n: PersonRule(name=n, route=route, **manners.get(n, {})) for n, route in routes.items()}
         changed = rules.model_copy(update={"people": tuple({**before, **walking}.values())})
         _check_people(changed, self.standing)
@@ -224,9 +229,8 @@ class World:
         Raises WorldError when a person walks already, an object has one of the names, or a waypoint is unknown.
         """
         before = {rule.name: rule for rule in self.seed_rules.people}
-        for name in walks:
-            if name in before and before[name].route is not None:
-                raise WorldError(f"{name} walks already")
+        if walking := [name for name in walks if name in before and before[name].route is not None]:
+            raise WorldError(f"{walking[0]} walks already")
         stays = {name: before[name].model_copy(update={"route": walks[name]}) for name in walks if name in before}
         people = tuple({**before, **stays}.values())
         stood = replace(self, seed_rules=self.seed_rules.model_copy(update={"people": people}))
@@ -326,21 +330,18 @@ def add_package(package_map: PackageMap) -> None:
 
 
 def known_worlds() -> tuple[str, ...]:
-    """Names of the worlds in the project."""
-    return tuple(sorted(path.parent.name for path in WORLDS_FOLDER.glob(f"*/{DIRECTIVES}")))
+    """Names of the worlds in the project, then of those in plug-ins."""
+    own = sorted(path.parent.name for path in WORLDS_FOLDER.glob(f"*/{DIRECTIVES}"))
+    return tuple(dict.fromkeys((*own, *sorted(each.name for each in installed_plugins(WORLDS)))))
 
 
 def load_world(name_or_path: str | Path) -> World:
-    """Loads a world by its name, or by the path of its folder.
-
-    Raises:
-        InputError: there is no such world, or one of its files or a file that they name is wrong; with file and line.
-    """
+    """Loads a world by name or folder. Raises InputError, with file and line, for wrong files and those they name."""
     folder = _find_folder(name_or_path)
     check_directives(folder / DIRECTIVES, folder)
-    knowledge = validate(Knowledge, _read(folder / "knowledge.yaml"))
+    knowledge = validate(Knowledge, read_yaml(folder / "knowledge.yaml", hint="every world needs this file"))
     objects = folder / "objects.yaml"
-    source = _read(objects) if objects.exists() or objects.is_symlink() else None
+    source = read_yaml(objects) if objects.exists() or objects.is_symlink() else None
     rules = NO_SEED_RULES if source is None else validate(SeedRules, source)
     surfaces = {name: SurfaceTop(name, top.polygon, top.height) for name, top in knowledge.surfaces.items()}
     poses = {name: knowledge.place_pose(name) for name in knowledge.place_names()}
@@ -385,20 +386,15 @@ def _with_imports(known: Mapping[str, Import], folders: Iterable[Path]) -> Mappi
 
 
 def _find_folder(name_or_path: str | Path) -> Path:
-    named = WORLDS_FOLDER / name_or_path
-    for folder in (named, Path(name_or_path)):
+    named, entries = WORLDS_FOLDER / name_or_path, installed_plugins(WORLDS).select(name=str(name_or_path))
+    for folder in (named, *(package_folder(each) / each.name for each in entries), Path(name_or_path)):
         if is_file(folder / DIRECTIVES):
             return folder.resolve()
     close = nearest_name(str(name_or_path), known_worlds())
     hint = f" Did you mean {close!r}?" if close else ""
     known = ", ".join(known_worlds())
-    raise UnknownWorldError(
-        f"unknown world {str(name_or_path)!r}.{hint} Known worlds: {known}; or give a folder with a world.dmd.yaml"
-    )
-
-
-def _read(path: Path) -> YamlSource:
-    return read_yaml(path, hint="every world needs this file")
+    what = f"unknown world {str(name_or_path)!r}.{hint} Known worlds: {known}; or give a folder with a world.dmd.yaml"
+    raise UnknownWorldError(what)
 
 
 def _check_surfaces(rules: SeedRules, surfaces: dict[str, SurfaceTop]) -> None:
@@ -442,7 +438,7 @@ def _check_people(rules: SeedRules, standing: Mapping[str, Point]) -> None:
         taken.add(name)
     for index, rule in enumerate(rules.people):
         path, waypoints = ("people", index, "route"), () if rule.route is None else rule.route.waypoints
-        if rule.pose is None and rule.ranges is None and not waypoints:
+        if not (rule.stands or rule.ranges or waypoints):
             raise WorldError(f"{rule.name} stands nowhere at first; give the route a first waypoint", path=path)
         for at in (each.at if isinstance(each, Stop) else each for each in waypoints):
             if isinstance(at, str) and at not in standing:

@@ -25,6 +25,8 @@ SENTENCES: Final = "errand.sentences"
 """Group of the functions that add the steps of a clause that they understand to a sentence's builder."""
 STACKS: Final = "errand.stacks"
 """Group of the names of stack files; the value names the package with the file `NAME_stack.yaml`."""
+WORLDS: Final = "errand.worlds"
+"""Group of the names of worlds; the value names the package with the folder `NAME`."""
 KERNELS: Final = "errand.kernels"
 """Group of the functions without arguments that run numeric code for a short time, so that it is compiled."""
 
@@ -33,7 +35,7 @@ RECOGNISERS: Final = "errand.recognisers"
 OBSERVERS: Final = "errand.observers"
 """Group of the functions that return a visitor for a run (`errand run --observe NAME=VALUE`, or `--NAME VALUE`)."""
 FUNCTIONS: Final = (KERNELS, RECOGNISERS, SENTENCES)
-GROUPS: Final = (CLASSES, NODES, TASKS, STACKS, *FUNCTIONS, OBSERVERS)
+GROUPS: Final = (CLASSES, NODES, TASKS, STACKS, WORLDS, *FUNCTIONS, OBSERVERS)
 
 OURS: Final = "spot-errand"
 """Distribution of this project, whose modules need no time limit."""

@@ -29,7 +29,7 @@ from executive.words.command import parse_command
 from executive.words.knowledge import Knowledge, load_knowledge
 from executive.words.leaf_steps import steps_of_commands
 from executive.words.mission import Mission
-from plant.worlds.world import WORLDS_FOLDER, known_worlds, load_world
+from plant.worlds.world import WORLDS_FOLDER, load_world
 from skills.api import (
     Cause,
     Failed,
@@ -47,6 +47,7 @@ from skills.robot import CommandState, CommandStatus, Lease
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot
 from tests.executive.house_tasks import MORE_TASKS, TASKS, tasks_installed
+from tests.project import shipped_worlds
 from tests.tables import yaml_beside
 from tests.visitors import OnMessage, OnTick
 
@@ -271,7 +272,7 @@ FETCH = (
 def what_is_shipped_is_read_once():
     """Worlds of the project, their knowledge, and the installed skills; a world elsewhere is read each time."""
     world, knowledge = cache(load_world), cache(load_knowledge)
-    names = known_worlds()
+    names = shipped_worlds()
 
     def load(name):
         return world(name) if name in names else load_world(name)

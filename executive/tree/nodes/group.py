@@ -18,7 +18,6 @@ from executive.tree.nodes.recovery import Afterwards
 from executive.tree.nodes.values import set_plan
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words import steps as model
-from executive.words.command import START
 from executive.words.condition import AllOf, Condition, ValueIs
 from executive.words.expression import Expression, Template, kind_of, literal
 from executive.words.goal import GoalCondition, GoalKind, When
@@ -204,7 +203,8 @@ def whole_mission(mission: Mission, builder: PlanBuilder, steps: tuple[NodeSpec,
     used = (step.mission for step in all_steps if isinstance(step, UseMission))
     policies: tuple[Policy, ...] = (mission, *all_steps, *used)
     returns = any(policy.on_failure is OnFailure.RETURN for policy in policies)
-    leads_back = returns or any(command.goal == START for command in mission.commands)
+    bound = (value for step in steps for node in step.walk() for value in node.options.get("inputs", {}).values())
+    leads_back = returns or any(getattr(value, "key", None) == builder.start_key for value in bound)
     first = [remember] if leads_back else []
     if mission.is_empty and not any(map(_may_skip, steps)):
         return builder.sequence(mission.name, *first, *steps)

@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from plant.worlds.geometry_files import MOST_XML_DEPTH, check_directives, check_model
-from plant.worlds.world import known_worlds, load_world
+from plant.worlds.world import load_world
 from skills.inputs.errors import InputError
+from tests.project import shipped_worlds
 from tests.tables import table
 
 FILES = Path(__file__).with_name("geometry_files")
@@ -47,7 +48,7 @@ def test_a_good_world_is_taken(home):
     check_directives(home / "world.dmd.yaml", home)
 
 
-@pytest.mark.parametrize("name", known_worlds())
+@pytest.mark.parametrize("name", shipped_worlds())
 def test_the_worlds_that_come_with_the_plant_are_taken(name):
     assert load_world(name).name == name
 

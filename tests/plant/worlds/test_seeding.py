@@ -11,7 +11,7 @@ from pydrake.math import RollPitchYaw
 from executive.words.knowledge import Pose
 from executive.words.mission import Route
 from plant.models.catalogue import load_catalogue
-from plant.worlds.seeding import outline_W, place_objects, place_people, polygon_distance
+from plant.worlds.seeding import outline_W, place_objects, place_people, polygon_distance, standing_W
 from plant.worlds.world import PersonRule, WorldError, load_world
 from skills.robot import Pose2D
 
@@ -109,6 +109,14 @@ def test_a_person_with_a_pose_stands_and_faces_as_it_says_and_walks_from_there(w
     assert stands.X_WO.translation() == pytest.approx([4.0, 4.4, 0.0])
     assert RollPitchYaw(stands.X_WO.rotation()).yaw_angle() == pytest.approx(1.0)
     assert (stands.route, sets_off.route.stops[0].at_W) == (None, (4.0, 4.4))
+
+
+def test_the_seed_chooses_one_of_a_persons_poses(world):
+    kim = PersonRule(name="Kim", poses=(Pose(x=4.0, y=4.4, yaw=1.0), Pose(x=3.0, y=4.4, yaw=0.0)))
+    moved = dataclasses.replace(world, seed_rules=world.seed_rules.model_copy(update={"people": (kim,)}))
+    chosen = [float(place_people(moved, seed)[0].X_WO.translation()[0]) for seed in range(12)]
+    assert {*chosen} == {3.0, 4.0}
+    assert sorted(standing_W(moved, kim)) == [(3.0, 4.4), (4.0, 4.4)]
 
 
 @pytest.mark.parametrize(

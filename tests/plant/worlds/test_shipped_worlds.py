@@ -10,8 +10,9 @@ from executive.tree.nodes.door_check import view_of
 from executive.words.knowledge import load_knowledge
 from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.worlds.seeding import place_objects, place_people
-from plant.worlds.world import known_worlds, load_world
+from plant.worlds.world import load_world
 from tests.plant.worlds.plain_map import FREE, OCCUPIED, UNKNOWN, Map
+from tests.project import shipped_worlds
 
 FOOTPRINT_M = (1.1, 0.6)  # the standing outline of 1.0 by 0.5 with 5 cm around
 OUTLINES_M = {"flat": (12.0, 9.0), "shop": (18.0, 13.0), "lab": (37.0, 18.0)}
@@ -64,7 +65,7 @@ def known_poses(knowledge):
 
 
 def test_these_worlds_come_with_the_project():
-    assert known_worlds() == tuple(sorted(OUTLINES_M))
+    assert shipped_worlds() == tuple(sorted(OUTLINES_M))
 
 
 def test_every_known_pose_is_free(knowledge, keepout):

@@ -2,14 +2,18 @@
 
 import os
 import shutil
+from importlib.metadata import EntryPoint, EntryPoints
 
 import pytest
 
 from executive.words.mission import Route
+from plant.worlds import world as world_module
 from plant.worlds.seeding import PointStop, place_objects, place_people
-from plant.worlds.world import WORLDS_FOLDER, known_worlds, load_world
+from plant.worlds.world import WORLDS_FOLDER, WorldError, known_worlds, load_world
 from skills.inputs.errors import InputError
+from skills.inputs.plugins import WORLDS
 from skills.robot import Pose2D
+from tests.project import shipped_worlds
 from tests.tables import table
 
 
@@ -25,7 +29,7 @@ def copy(tmp_path):
 
 def test_flat_is_known_and_has_its_rooms_and_files():
     world = load_world("flat")
-    assert "flat" in known_worlds()
+    assert "flat" in shipped_worlds()
     assert {"hall", "kitchen", "living room", "bedroom", "bathroom", "workshop"} <= set(world.rooms)
     for path in (world.directives_path, world.knowledge_path, world.scan_map_path, world.keepout_map_path):
         assert path.is_file()
@@ -33,6 +37,18 @@ def test_flat_is_known_and_has_its_rooms_and_files():
 
 def test_a_world_is_loaded_by_its_folder_too(copy):
     assert load_world(copy).name == "home"
+
+
+def test_a_world_of_a_plug_in_is_known_by_its_name_and_an_unknown_one_is_told_it(copy, tmp_path, monkeypatch):
+    shutil.copytree(copy, tmp_path / "hut_worlds" / "hut")
+    (tmp_path / "hut_worlds" / "__init__.py").touch()
+    monkeypatch.syspath_prepend(tmp_path)
+    entries = EntryPoints([EntryPoint("hut", "hut_worlds", WORLDS)])
+    monkeypatch.setattr(world_module, "installed_plugins", lambda group: entries.select(group=group))
+    assert load_world("hut").folder == tmp_path / "hut_worlds" / "hut"
+    assert known_worlds() == (*shipped_worlds(), "hut")
+    with pytest.raises(WorldError, match="Did you mean 'hut'"):
+        load_world("huts")
 
 
 def test_an_unknown_world_is_told_the_near_one():

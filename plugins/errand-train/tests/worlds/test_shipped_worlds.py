@@ -11,7 +11,7 @@ from tests.plant.worlds.plain_map import FREE, Map
 
 
 def test_every_plan_is_a_world_that_comes_with_the_project():
-    assert known_worlds() == tuple(sorted(PLANS))
+    assert {*PLANS} <= {*known_worlds()}
 
 
 CLOSED = [(name, door) for name in PLANS for door in load_plan(name).doors if not door.open]

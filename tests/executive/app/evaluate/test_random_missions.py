@@ -9,7 +9,8 @@ from executive.app.evaluate.random_missions import KINDS, TURNS, KnownWorld, ran
 from executive.language.parser import load_parser
 from executive.language.understand import Status, understand
 from executive.words.knowledge import Knowledge, load_knowledge
-from plant.worlds.world import known_worlds, load_world
+from plant.worlds.world import load_world
+from tests.project import shipped_worlds
 
 
 def known(name):
@@ -17,7 +18,7 @@ def known(name):
     return KnownWorld(name, knowledge, frozenset(knowledge.things))
 
 
-WORLDS = tuple(known(name) for name in known_worlds())
+WORLDS = tuple(known(name) for name in shipped_worlds())
 BARE = {"start": {"x": 0, "y": 0}, "places": {"hall": {"pose": {"x": 1, "y": 0}, "polygon": [(0, 0), (2, 0), (2, 2)]}}}
 
 

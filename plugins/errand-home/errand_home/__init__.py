@@ -1,0 +1,1 @@
+"""Household tasks, a world, its objects and facts: commands of RoboCup@Home."""

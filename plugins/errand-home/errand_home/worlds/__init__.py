@@ -1,0 +1,1 @@
+"""Worlds; each is a folder."""

@@ -202,7 +202,7 @@ def _rested(
     one: ObjectHistory, condition: GoalCondition, truth: Truth, from_s: float, until_s: float
 ) -> Iterable[FloatArray | None]:
     for time_s in (from_s, *(each for each in one.rested_s if from_s < each < until_s), until_s):
-        p_W = one.place_at(time_s)
+        p_W = one.place_at(time_s) if condition.answered_s is not None else one.last.p_WO if one.resting else None
         yield p_W if p_W is not None and has_relations(one, p_W, time_s, condition, truth) else None
 
 

@@ -288,7 +288,8 @@ def _judge_cleared(condition: GoalCondition, truth: Truth) -> Finding:
     missing = [one for one in there if _put_in(one, condition, truth) is None]
     if not missing:
         return Finding(True, f"{_names(there)} {'stands' if len(there) == 1 else 'stand'} on {where(condition.goal)}.")
-    return Finding(False, f"{_names(missing)} stand{'s' * (len(missing) == 1)} not on {where(condition.goal)}.")
+    do = "does" if len(missing) == 1 else "do"
+    return Finding(False, f"{_names(missing)} {do} not stand on {where(condition.goal)}.")
 
 
 def _was_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:

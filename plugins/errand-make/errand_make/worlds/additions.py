@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Final
 
 from errand_make.worlds import furnish
-from errand_make.worlds.rooms import BANDS_M
+from errand_make.worlds.rooms import BANDS_M, body_margin_m, clearance_m
 from errand_make.worlds.site import Site, restored
 from errand_make.worlds.wanted import Addition, Wanted
-from executive.app.prepare.worlds import open_world, refuse_unusable
+from executive.app.prepare.worlds import knowledge_of, open_world, refuse_unusable
 from plant.models.catalogue import load_catalogue, read_imported
 from plant.worlds.world import WorldError
 from skills.inputs.errors import InputError, listing, nearest_name, suggestion
+from skills.inputs.yaml_source import read_yaml
 from skills.robot import Pose2D
 
 
@@ -137,6 +138,11 @@ def _add_place(site: Site, wanted: Wanted) -> str:
     file, pose = site.folder / "knowledge.yaml", dict(zip(("x", "y", "yaw"), wanted.at, strict=True))
     file.write_text(furnish.with_entry(file, "places", wanted.name, {"pose": pose}), encoding="utf-8")
     x, y, yaw = wanted.at
+    knowledge_of(open_world(str(site.folder)))
+    if body_margin_m(grid := site.grid(), clearance_m(grid), Pose2D(x, y, yaw)) <= 0.0:
+        what = f"places.{wanted.name}: at ({x:g}, {y:g}, {yaw:g}) the robot's body stands in an obstacle"
+        hint = "give a free pose; `errand world show` draws the world"
+        raise read_yaml(file).error(("places", wanted.name), what, hint)
     return f"{wanted.name} at ({x:.2f}, {y:.2f}, {yaw:.2f})"
 
 

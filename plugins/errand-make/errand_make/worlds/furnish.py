@@ -157,11 +157,16 @@ def refusal(world: World, grid: Grid, piece: Furniture, rooms: Mapping[str, Pose
             return f"{other} stands there"
     if min(body_margin_m(after, clearance, pose) for pose in piece.viewpoints()) < _SPARE_M:
         return "there is no room for the robot in front"
-    kept = {**rooms, "": world.start}
-    if any(body_margin_m(after, clearance, pose) < 0.0 for pose in kept.values()):
+    before, was_reached = clearance_m(grid), reached_cells(clearance_m(grid), grid, world.start)
+    usable = {
+        name: pose
+        for name, pose in {**rooms, "": world.start}.items()
+        if body_margin_m(grid, before, pose) >= 0.0 and _in(was_reached, grid, pose)
+    }
+    if any(body_margin_m(after, clearance, pose) < 0.0 for pose in usable.values()):
         return "it stands where the robot starts, or from where it looks at a room or surface"
     reached = reached_cells(clearance, after, world.start)
-    if not all(_in(reached, after, pose) for pose in (*kept.values(), *piece.viewpoints())):
+    if not all(_in(reached, after, pose) for pose in (*usable.values(), *piece.viewpoints())):
         return "the robot could no longer reach all rooms and its front"
     return None
 

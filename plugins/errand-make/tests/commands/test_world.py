@@ -8,6 +8,7 @@ import cv2
 import pytest
 import shapely
 
+from errand_make.worlds.furnish import with_entry
 from executive import check, load_world
 from executive.app.runs.simulated import simulate
 from executive.words.knowledge import load_knowledge
@@ -72,6 +73,24 @@ def test_a_named_pose_is_a_place_to_go_to_and_no_room(own):
     assert [str(command) for command in checked.trees[0].commands] == [
         "Take [Nothing] to [pump] and do [Nothing] to [Nothing]"
     ]
+
+
+def test_a_named_pose_without_space_for_the_body_is_refused(own_table):
+    (surface,) = load_knowledge(own_table / "knowledge.yaml").surfaces.values()
+    x, y = surface.polygon[0]
+    view = surface.viewpoints[0]
+    x, y = (0.65 * x + 0.35 * view.x, 0.65 * y + 0.35 * view.y)
+    assert "body stands in an obstacle" in refusal("world", "add", "place", own_table, "pump", "--at", x, y, view.yaw)
+
+
+def test_a_blocked_pose_of_the_file_does_not_keep_additions_out(own_table):
+    file = own_table / "knowledge.yaml"
+    (surface,) = load_knowledge(file).surfaces.values()
+    view = surface.viewpoints[0]
+    ahead = (view.x + 0.4 * math.cos(view.yaw), view.y + 0.4 * math.sin(view.yaw))
+    pose = {"x": round(ahead[0], 3), "y": round(ahead[1], 3), "yaw": view.yaw}
+    file.write_text(with_entry(file, "places", "pump", {"pose": pose}), encoding="utf-8")
+    done("world", "add", "person", own_table, "Kim", "--in", "room 2")
 
 
 def test_a_name_that_no_sentence_can_say_is_warned_of(own):

@@ -12,7 +12,7 @@ import shapely
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
-from skills.api import Cause, Detection, ObjectObservation, Part, Running, SkillContext, Succeeded, SurveyView
+from skills.api import Cause, Detection, ObjectObservation, Part, Running, SkillContext, Succeeded
 from skills.descriptions import count_sentence
 from skills.detect.messages import detections_message
 from skills.footprint import SAFE_MARGIN_M, Footprint, footprint_clear, footprint_clearance_m, pose_array
@@ -274,9 +274,8 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
             if not patience.is_left():
                 raise SkillFailure(Cause.PRECONDITION, "there is no new scan to see people in")
             yield Running(f"{message}; waits for a scan")
-        X_WB, costmap = self.context.localiser.estimate().X_WO @ scan.X_OB, self.context.costmap
-        survey = costmap if isinstance(costmap, SurveyView) else None
-        return people_in_scan(scan, X_WB, robot.capabilities().footprint_m, survey=survey, abreast=abreast)
+        X_WB, footprint_m = self.context.localiser.estimate().X_WO @ scan.X_OB, robot.capabilities().footprint_m
+        return people_in_scan(scan, X_WB, footprint_m, costmap=self.context.costmap, abreast=abreast)
 
 
 @dataclass(frozen=True)

@@ -85,19 +85,20 @@ def people_in_scan(
     X_WB: RigidTransform,
     footprint_m: Sequence[tuple[float, float]],
     furthest_m: float = 3.5,
-    survey: SurveyView | None = None,
+    costmap: object = None,
     *,
     ahead_m: float = ARM_AHEAD_M,
     abreast: bool = False,
 ) -> list[SeenPerson]:
     """Detects people in a LiDAR scan, nearest first; ignores points inside and just outside the robot's footprint.
 
-    With `abreast`, returns that are too wide for one person are several people side by side.
+    With a `costmap` that has a survey of the site, what the survey explains is nobody, and a person may stand at a
+    wall; without one, only who stands alone counts. With `abreast`, returns too wide for one person are several people.
     """
     corners = np.array(footprint_m)
     own_m = np.array([corners.min(axis=0) - (_OWN_M[0], _OWN_M[1]), corners.max(axis=0) + (ahead_m, _OWN_M[1])])
-    if survey is not None and len(scan.elevations_rad) > 1:
-        clusters = _unexplained_clusters(scan, X_WB, own_m, furthest_m, survey)
+    if isinstance(costmap, SurveyView) and len(scan.elevations_rad) > 1:
+        clusters = _unexplained_clusters(scan, X_WB, own_m, furthest_m, costmap)
         clusters = [one for each in clusters for one in (_abreast(each) if abreast else (each,))]
         people = [_person(scan.stamp_s, X_WB, cluster) for cluster in clusters if _is_body_sized(cluster)]
     else:

@@ -208,7 +208,8 @@ class HandOver(HandOverVerification[HandOverInputs]):
             patience.reset()
             if scan.stamp_s > stamp_s:
                 stamp_s = scan.stamp_s
-                people = people_in_scan(scan, self.X_WB(), self.context.robot.capabilities().footprint_m)
+                footprint_m = self.context.robot.capabilities().footprint_m
+                people = people_in_scan(scan, self.X_WB(), footprint_m, costmap=self.context.costmap)
                 near = (p for p in people if not seen or math.dist(p.place_W, seen[0].place_W) < _SAME_PERSON_M)
                 seen += [*near][:1]
             yield Running(f"looking for {name}")

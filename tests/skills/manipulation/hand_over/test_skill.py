@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from analytic_scan import scan_of
 from planar_people import LateAnswer
-from table_robot import MODEL, TableRobot, context_of, failed, outcome
+from table_robot import MODEL, BlockCostmap, TableRobot, context_of, failed, outcome
 from table_scene import BLUE, GREY, Can
 
 from skills.api import Cause, Failed, Running, Succeeded
@@ -57,6 +57,18 @@ def test_an_empty_gripper_is_a_failed_precondition():
 def test_nobody_in_sight_is_a_failed_precondition():
     robot = _before_robin(scan_now=scan_of())
     failed(HandOver(context_of(robot)), HandOverInputs("Robin"), Cause.PRECONDITION, "nobody is seen near")
+
+
+class _SurveyedWall(BlockCostmap):
+    """Its survey explains a wall 1.55 m before the robot."""
+
+    def is_unexplained(self, points_W):
+        return points_W[:, 0] < 1.4
+
+
+def test_a_person_with_the_back_to_a_surveyed_wall_gets_the_object():
+    robot = _before_robin(scan_now=scan_of([(1.4, 0.0, 0.2)], wall_x=1.55), carries=True)
+    assert isinstance(outcome(HandOver(context_of(robot, costmap=_SurveyedWall())), BEER), Succeeded)
 
 
 # person, met before -> whom the result names

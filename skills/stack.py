@@ -24,6 +24,7 @@ from skills.inputs.plugins import (
     PluginDefect,
     distribution_of,
     installed_plugins,
+    missing_plugin,
     package_folder,
     run_plugin,
 )
@@ -153,13 +154,16 @@ def _component(slot: str, given: Any) -> tuple[str, Any]:
         raise StackError((slot,), "should be a mapping", f"write '{slot}: {{{USE}: NAME}}', then the options")
     if USE not in given and ALSO_USE in given:
         given = {USE if key == ALSO_USE else key: value for key, value in given.items()}
-    known = _names(slot)
-    name = given.get(USE, known[0])
-    if name not in known:
-        raise StackError((slot, USE), f"there is no {slot} {display_text(name)}", suggestion(str(name), known))
-    return name, _typed(
-        (slot,), _loaded(slot, name, SLOTS[slot]), {key: value for key, value in given.items() if key != USE}
-    )
+    name = given.get(USE, _default_data()[slot][USE])
+    return name, _typed((slot,), component_of(slot, name), {key: each for key, each in given.items() if key != USE})
+
+
+def component_of(slot: str, name: Any) -> type:
+    """Returns the component of a slot by its name. Raises StackError when it is not installed or cannot load."""
+    if name in (known := _names(slot)):
+        return _loaded(slot, name, SLOTS[slot])
+    unknown = f"there is no {slot} {display_text(name)}", suggestion(str(name), known)
+    raise StackError((slot, USE), *(missing_plugin(SLOTS[slot], str(name)) or unknown))
 
 
 @cache

@@ -23,9 +23,9 @@ from pathlib import Path
 import numpy as np
 from pydantic import TypeAdapter
 
+from errand_make.detectors.exported import ExportedNetwork, load_exported
 from executive.app.report.pictures import read_picture
 from skills.perception.detector.boxes import overlaps
-from skills.perception.detector.exported import ExportedNetwork, load_exported
 
 MOST_PX, MOST_SCORE, TIE_OVERLAP = 1.0, 0.01, 0.5
 

@@ -28,7 +28,8 @@ def open_detector(file: Path | None, threshold: float) -> Detector:
 
         component = load_stack(file).detector
     else:
-        component = components("detector")["onnx"](file)
+        detectors = components("detector")
+        component = detectors.get("onnx", detectors["cascade"])(file)
     if isinstance(component, PictureDetectorComponent):
         return component.build_for_pictures(threshold)
     return with_defaults(component.build())

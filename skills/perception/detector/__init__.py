@@ -1,4 +1,4 @@
-"""Detectors of objects in pictures: a cascade of three small networks, or an exported network, in ONNX Runtime."""
+"""Detector of objects in pictures: a cascade of three small networks in ONNX Runtime."""
 
 from __future__ import annotations
 
@@ -39,6 +39,8 @@ class Cascade:
         from skills.perception.detector.model_files import MODEL_FILE
         from skills.perception.detector.onnx_detector import DetectorOptions, load_detector
 
+        if self.file is not None:
+            _check_cascade(self.file)
         return load_detector(self.file or MODEL_FILE, DetectorOptions(threshold=threshold))
 
 
@@ -63,15 +65,27 @@ class _LoadedWhenUsed(DetectorWrapper):
     @cached_property
     def _detector(self) -> Detector:  # type: ignore[override]
         from skills.perception.detector.augmentation import AugmentedDetector
-        from skills.perception.detector.exported import ExportedNetwork, load_exported
-        from skills.perception.detector.layouts import LAYOUTS
-        from skills.perception.detector.model_files import MODEL_FILE, ModelFileError, is_cascade
+        from skills.perception.detector.model_files import MODEL_FILE
         from skills.perception.detector.onnx_detector import load_detector
 
         file = self._options.file
-        if file is not None and not is_cascade(file):
-            about = LAYOUTS[load_exported(ExportedNetwork(file), every=True).layout].about
-            hint = "write 'detector: {use: onnx, file: ...}'; other detectors come as a class of errand.detectors"
-            raise ModelFileError(f"it is no cascade of Errand, but {about}", hint=hint, file=file)
+        if file is not None:
+            _check_cascade(file)
         single = load_detector(file or MODEL_FILE)
         return AugmentedDetector(single) if self._options.views else single
+
+
+def _check_cascade(file: Path) -> None:
+    """Raises ModelFileError unless a file holds a network of Errand."""
+    from skills.perception.detector.model_files import ModelFileError, is_cascade
+    from skills.stack import StackError, component_of
+
+    if is_cascade(file):
+        return
+    try:
+        about = component_of("detector", "onnx")(file).build_for_pictures(0.0).about.partition(";")[0]
+    except StackError as error:
+        what = f"it is no cascade of Errand, and the detector {error.message}"
+        raise ModelFileError(what, hint=error.hint, file=file) from error
+    hint = "write 'detector: {use: onnx, file: ...}'; other detectors come as a class of errand.detectors"
+    raise ModelFileError(f"it is no cascade of Errand, but {about}", hint=hint, file=file)

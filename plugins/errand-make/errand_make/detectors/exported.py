@@ -14,29 +14,24 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.class_forms import class_forms
-from skills.detection import Detections, Detector
-from skills.inputs.errors import nearest_name, suggestion
-from skills.inputs.outside import read_text
-from skills.perception.detector.boxes import (
-    Floats,
-    SuppressionOptions,
-    check_picture,
-    detections_from,
-    select_candidates,
-)
-from skills.perception.detector.layouts import (
+from errand_make.detectors.layouts import (
     LAYOUTS,
     WITH_MORE_COLUMNS,
     WITH_NO_OBJECT,
     Facts,
+    Floats,
     Outputs,
     Preparation,
     decode,
     recognise,
 )
+from skills.api import Detection, Detector
+from skills.class_forms import class_forms
+from skills.inputs.errors import nearest_name, suggestion
+from skills.inputs.outside import read_text
+from skills.perception.detector import Cascade
+from skills.perception.detector.boxes import SuppressionOptions, check_picture, detections_from, select_candidates
 from skills.perception.detector.model_files import ModelFileError, is_cascade, open_session
-from skills.perception.detector.onnx_detector import DetectorOptions, load_detector
 from skills.perception.shape_model import ShapeModel, shape_model
 from skills.quantities import Count, Factor, Quantity, Share
 from skills.robot import Picture
@@ -103,7 +98,7 @@ class ExportedNetwork:
     def build_for_pictures(self, threshold: float) -> Detector:
         """Loads the network for single pictures, also one of Errand's own. Raises InputError for an unusable file."""
         if is_cascade(self.file):
-            return load_detector(self.file, DetectorOptions(threshold=threshold))
+            return Cascade(self.file).build_for_pictures(threshold)
         return load_exported(self, threshold, every=True)
 
 
@@ -130,11 +125,11 @@ class ExportedDetector(Detector):
         model = shape_model()
         return model if {*self.class_names} <= {*model.names} else None
 
-    def detect(self, pictures: Sequence[Picture]) -> list[Detections]:
+    def detect(self, pictures: Sequence[Picture]) -> list[tuple[Detection, ...]]:
         """Detects the objects in each picture, best first. Raises ValueError when an array is no picture."""
         return [self.detect_in_views(picture) for picture in pictures]
 
-    def detect_in_views(self, picture: Picture, least_score: float | None = None) -> Detections:
+    def detect_in_views(self, picture: Picture, least_score: float | None = None) -> tuple[Detection, ...]:
         """Detects the objects in one picture, best first; `least_score` replaces the threshold."""
         check_picture(picture)
         threshold = self.threshold if least_score is None else least_score

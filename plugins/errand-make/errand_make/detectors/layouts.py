@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from skills.inputs.yaml_source import read_yaml
-from skills.perception.detector.boxes import PADDING, Floats
+from skills.perception.detector.boxes import PADDING
 
+Floats = NDArray[np.float32]
 Outputs = Mapping[str, NDArray[Any]]
 """Outputs of a run on one picture by name, with their batch axis; numbers with a fraction are float32."""
 WITH_MORE_COLUMNS: Final = ("segment", "pose")

@@ -4,12 +4,12 @@ import numpy as np
 import onnx
 import pytest
 
+from errand_make.detectors.exported import ExportedNetwork, load_exported, place
+from errand_make.detectors.layouts import LAYOUTS
 from executive.testing.skill_test import carry_out, load_skill_tests, scripted_maker
 from plant.robots.spot.kind import spot_capabilities
 from skills.inputs.errors import InputError
 from skills.perception.detector import Cascade
-from skills.perception.detector.exported import ExportedNetwork, load_exported, place
-from skills.perception.detector.layouts import LAYOUTS
 from skills.perception.detector.model_files import ModelFileError
 from skills.stack import stack_of
 from skills.testing.blocks import TABLE_CAN

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from skills.perception.detector.exported import ExportedNetwork, load_exported
-from skills.perception.detector.layouts import LAYOUTS
+from errand_make.detectors.exported import ExportedNetwork, load_exported
+from errand_make.detectors.layouts import LAYOUTS
 from tests.skills.exported_networks import export
 
 NAMES = {"names": "{0: 'bottle', 1: 'coke', 2: 'hammer'}", "task": "detect"}

@@ -1,0 +1,1 @@
+"""Detectors that run networks which other tools exported to ONNX."""

@@ -28,8 +28,7 @@ def open_detector(file: Path | None, threshold: float) -> Detector:
 
         component = load_stack(file).detector
     else:
-        detectors = components("detector")
-        component = detectors.get("onnx", detectors["cascade"])(file)
+        component = components("detector").get("onnx", type(default_component("detector")))(file)
     if isinstance(component, PictureDetectorComponent):
         return component.build_for_pictures(threshold)
     return with_defaults(component.build())

@@ -6,15 +6,11 @@ import pytest
 
 from errand_make.detectors.exported import ExportedNetwork, load_exported, place
 from errand_make.detectors.layouts import LAYOUTS
-from executive.testing.skill_test import carry_out, load_skill_tests, scripted_maker
-from plant.robots.spot.kind import spot_capabilities
 from skills.inputs.errors import InputError
 from skills.perception.detector import Cascade
 from skills.perception.detector.model_files import ModelFileError
 from skills.stack import stack_of
-from skills.testing.blocks import TABLE_CAN
-from tests.project import core_skills
-from tests.skills.exported_networks import coloured_patch, export, mean_colour
+from tests.skills.exported_networks import export, mean_colour
 
 THREE = {"names": "{0: 'bottle', 1: 'coke', 2: 'hammer'}"}
 RED = np.full((64, 64, 3), (200, 100, 0), np.uint8)
@@ -338,31 +334,6 @@ def test_a_cascade_names_the_layout_of_an_exported_file(tmp_path):
     assert "it is no cascade of Errand, but Ultralytics YOLO" in message
     assert "detector: {use: onnx" in message
     assert "errand.detectors" in message
-
-
-SKILL_TESTS = """\
-skill: detect
-robot: {pose: {x: 0.45}, stack: own.yaml}
-with: {classes: [coke], surfaces: table}
-tests:
-  - name: the network sees the can
-    expect: {outcome: success, message: saw a coke on the table}
-  - name: it sees none where there is none
-    world: {can: false}
-    expect: {outcome: failure, cause: POSTCONDITION}
-"""
-
-
-@pytest.mark.parametrize("index", [0, 1])
-def test_a_skill_finds_an_object_with_an_own_network(tmp_path, index):
-    coloured_patch(tmp_path / "own.onnx", TABLE_CAN.colour)
-    (tmp_path / "own.yaml").write_text("detector: {use: onnx, file: own.onnx, classes: {can: coke}}\n")
-    path = tmp_path / "own.skilltest.yaml"
-    path.write_text(SKILL_TESTS)
-    skills = core_skills()
-    file = load_skill_tests(path, skills)
-    trial = carry_out(file, index, skills["detect"], {"scripted": scripted_maker(spot_capabilities())})
-    assert not trial.differences, trial.report()
 
 
 @pytest.mark.parametrize(("shape", "size_px"), [((90, 160, 3), (64, 64)), ((33, 50, 3), (64, 48))])

@@ -25,7 +25,7 @@ BASE = {
     "executive/testing": 617,
     "executive/app": 5899,
     "executive/cli": 2890,
-    "skills": 18792,
+    "skills": 18317,
     "plant": 8096,
 }
 """Lines of code of each room on 2026-11-30, before issue 85; issue 86 moved code between rooms, and took 105 out."""
@@ -44,26 +44,32 @@ GRANTS = (
     (87, "executive/cli", 40),
     (87, "skills", 1),
     (87, "plant", 35),
-    (88, "executive/words", 29),
+    (88, "executive/words", 12),
+    (88, "executive/language", 1),
     (88, "executive/speech", 4),
-    (88, "executive/mission", 2),
-    (88, "executive/tree", 45),
-    (88, "executive/run", 8),
+    (88, "executive/tree", 58),
+    (88, "executive/run", 12),
     (88, "executive/record", 1),
     (88, "executive/store", 22),
-    (88, "executive/view", 31),
-    (88, "executive/app", 79),
-    (88, "executive/cli", 82),
-    (88, "skills", 185),
-    (88, "plant", 6),
+    (88, "executive/view", 37),
+    (88, "executive/testing", 5),
+    (88, "executive/app", 111),
+    (88, "executive/cli", 80),
+    (88, "skills", 243),
+    (88, "plant", 33),
+    (90, "executive/words", 3),
+    (90, "executive/cli", 4),
+    (90, "skills", 3),
+    (90, "plant", 8),
 )
 """Issue, room, and the lines that the issue has added to the room."""
-GRANTED = {85: 700, 87: 643, 88: 494}
-"""Lines that an issue adds to all rooms together at most; `BASE` is without what has left, such as people by 87.
+GRANTED = {85: 700, 87: 643, 88: 619, 90: 200}
+"""Lines that an issue adds to all rooms together at most; `BASE` is without what has left, such as people by 87,
+and networks of other tools by 88.
 
 Issue 88 was to take 450.
 """
-MODULES, ONE_IMPORTER, SAME_NAME = 433, 61, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 431, 61, 7
 """All modules; those that one other imports; file names that stand more than once. Three modules more by 85."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

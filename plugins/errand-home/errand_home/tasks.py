@@ -35,7 +35,7 @@ class Compare(TaskPage):
         return compare_plan(builder)
 
     def promise(self, command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition:
-        """What the robot says is true of the objects at the place."""
+        """Returns the condition that what the robot says is true of the objects at the place."""
         classes, source = classes_of(command.object, knowledge), regions_of(command, knowledge, ())
         wanted, count = str(command.object), command.object_count
         return GoalCondition(GoalKind.OWN, classes, count, source, wanted=wanted, task=self.word)

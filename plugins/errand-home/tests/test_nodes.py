@@ -97,6 +97,6 @@ def test_a_comparison_that_is_not_certain_fails(context, scripts, found, superla
     assert (root.status, root.cause, says in root.message) == (F, cause, True), root.message
 
 
-def test_where_nothing_is_the_answer_is_no(context):
+def test_the_answer_is_no_where_nothing_is(context):
     root = compared(context, "O", [], "biggest")
     assert (root.status, root.answer, context.board.get("alice/q/text")) == (S, False, "there is no object on the desk")

@@ -55,7 +55,7 @@ def test_exit_ends_it(shell):
         ("check ", "patrol_", ["patrol_and_report"]),
         ("queue add ", "own", ["own.yaml"]),
         ("run --world ", "sh", ["shop"]),
-        ("run patrol --world ", "", ["flat", "lab", "shop"]),
+        ("run patrol --world ", "f", ["flat"]),
         ("run ", "--no-rec", ["--no-record"]),
         ("replay ", "", ["out/2026-12-02-0900-b", "out/2026-12-01-0900-a"]),
         ("log ", "out/2026-12-01", ["out/2026-12-01-0900-a", "out/2026-12-01-0900-a/"]),

@@ -36,12 +36,7 @@ class Cascade:
 
     def build_for_pictures(self, threshold: float) -> Detector:
         """Loads the networks for single pictures. Raises InputError if the file is unusable."""
-        from skills.perception.detector.model_files import MODEL_FILE
-        from skills.perception.detector.onnx_detector import DetectorOptions, load_detector
-
-        if self.file is not None:
-            _check_cascade(self.file)
-        return load_detector(self.file or MODEL_FILE, DetectorOptions(threshold=threshold))
+        return _loaded(self.file, threshold)
 
 
 @dataclass(frozen=True)
@@ -65,14 +60,22 @@ class _LoadedWhenUsed(DetectorWrapper):
     @cached_property
     def _detector(self) -> Detector:  # type: ignore[override]
         from skills.perception.detector.augmentation import AugmentedDetector
-        from skills.perception.detector.model_files import MODEL_FILE
-        from skills.perception.detector.onnx_detector import load_detector
 
-        file = self._options.file
-        if file is not None:
-            _check_cascade(file)
-        single = load_detector(file or MODEL_FILE)
+        single = _loaded(self._options.file)
         return AugmentedDetector(single) if self._options.views else single
+
+
+def _loaded(file: Path | None, threshold: float | None = None) -> Detector:
+    """Loads a cascade, by default the project's own. Raises ModelFileError if the file is unusable."""
+    from skills.perception.detector.model_files import MODEL_FILE, ModelFileError
+    from skills.perception.detector.onnx_detector import DetectorOptions, load_detector
+
+    options = DetectorOptions() if threshold is None else DetectorOptions(threshold=threshold)
+    try:
+        return load_detector(file or MODEL_FILE, options)
+    except ModelFileError:
+        _check_cascade(file or MODEL_FILE)
+        raise
 
 
 def _check_cascade(file: Path) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Self
 from skills.detection import Detector, DetectorWrapper
 
 if TYPE_CHECKING:
+    from skills.perception.detector.onnx_detector import OnnxDetector
     from skills.perception.shape_model import ShapeModel
 
 
@@ -65,14 +66,13 @@ class _LoadedWhenUsed(DetectorWrapper):
         return AugmentedDetector(single) if self._options.views else single
 
 
-def _loaded(file: Path | None, threshold: float | None = None) -> Detector:
+def _loaded(file: Path | None, threshold: float | None = None) -> OnnxDetector:
     """Loads a cascade, by default the project's own. Raises ModelFileError if the file is unusable."""
     from skills.perception.detector.model_files import MODEL_FILE, ModelFileError
     from skills.perception.detector.onnx_detector import DetectorOptions, load_detector
 
-    options = DetectorOptions() if threshold is None else DetectorOptions(threshold=threshold)
     try:
-        return load_detector(file or MODEL_FILE, options)
+        return load_detector(file or MODEL_FILE, None if threshold is None else DetectorOptions(threshold=threshold))
     except ModelFileError:
         _check_cascade(file or MODEL_FILE)
         raise

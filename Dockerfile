@@ -11,7 +11,8 @@ RUN apt-get update \
 WORKDIR /opt/errand
 COPY . .
 RUN python3 -m venv /opt/venv \
-    && /opt/venv/bin/pip install --no-cache-dir --constraint constraints.txt '.[visuals]'
+    && /opt/venv/bin/pip install --no-cache-dir --constraint constraints.txt '.[visuals]' \
+    && /opt/venv/bin/python /opt/errand/docs/file_schemas.py
 
 # Any user may run it: compiled code and runs are written where all may write.
 ENV PATH=/opt/venv/bin:$PATH NUMBA_CACHE_DIR=/var/cache/errand HOME=/work

@@ -10,7 +10,7 @@
 # make nightly  further missions, tutorials, seeds and worlds, and the smallest case of each measure
 # make wheels  a wheel of each distribution, the core and the plug-ins, in dist
 # make pythons  whether wheels of all dependencies exist for each Python
-# make docs   the documentation as a site: open out/site/index.html
+# make docs   the documentation as a site, with the pages that are made from the code: open out/site/index.html
 
 PYTHON ?= $(shell command -v python3.11 || echo python3)
 VENV := .venv
@@ -64,6 +64,7 @@ $(VENV)/.run: pyproject.toml VERSION $(PLUGINS:%=%/pyproject.toml) constraints.t
 	  || { echo "Errand needs Python 3.11, 3.12 or 3.13; set PYTHON=/path/to/python3.11"; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(INSTALL) --editable '.[visuals]' --editable plugins/errand-people
+	$(BIN)/python docs/file_schemas.py
 	@touch $@
 
 train: $(VENV)/.train
@@ -114,7 +115,8 @@ check: env
 	$(BIN)/python -m tests.rooms
 	test ! -x $(BIN)/hadolint || $(BIN)/hadolint Dockerfile
 
-wheels:
+wheels: $(VENV)/.run
+	$(BIN)/python docs/file_schemas.py
 	.ci/wheels
 
 pythons: $(VENV)/.run

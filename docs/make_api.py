@@ -57,9 +57,9 @@ def meaning(module: ModuleType, name: str) -> str:
     return ""
 
 
-def api_page(note: str) -> str:
+def api_page() -> str:
     """The text of the page."""
-    parts = [f"{note}# API reference\n\nThe names that [the public API](../api.md) lists.\n\n{PORTS}"]
+    parts = [f"# API reference\n\nThe names that [the public API](../api.md) lists.\n\n{PORTS}"]
     for module, names in public_names().items():
         loaded = import_module(module)
         parts.append(f"## {module}\n\n{_doc(loaded)}\n")

@@ -1,6 +1,6 @@
-"""Writes `docs/reference/` from schemas, skills, faults and the public API: run it after changing one of them.
+"""Makes the pages of the reference from schemas, skills, faults and the public API; the site adds them.
 
-python docs/make_reference.py
+python docs/make_reference.py [FOLDER]          # writes them as Markdown, into out/reference
 """
 
 from __future__ import annotations
@@ -41,15 +41,14 @@ from skills.stack import SLOTS, components, skill_options
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from file_schemas import project_skills, write_schemas
+from file_schemas import project_skills
 from make_api import api_page
 from mission_constructs import constructs_text
 
 from tests.benchmarks.sdk_promises import NOT_RUN, PROGRAMS, REFUSED, SERVED, Program
 
 ROOT = Path(__file__).resolve().parent.parent
-FOLDER = ROOT / "docs" / "reference"
-NOTE = "<!-- Written by docs/make_reference.py; don't edit. -->\n\n"
+FOLDER = ROOT / "out" / "reference"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -138,7 +137,7 @@ ONE_OF = {
 def pages() -> dict[str, str]:
     """The text of every page by file name."""
     written = {f"{page.name}.md": schema_page(page) for page in SCHEMA_PAGES}
-    more = {"skills.md": skills_page(), "stack.md": stack_page(), "faults.md": faults_page(), "api.md": api_page(NOTE)}
+    more = {"skills.md": skills_page(), "stack.md": stack_page(), "faults.md": faults_page(), "api.md": api_page()}
     return {**written, **more, "spot-api.md": spot_api_page()}
 
 
@@ -149,8 +148,8 @@ def spot_api_page() -> str:
     ]
     listed = ", ".join(f"`{name}`" for name in sorted(LISTED))
     return (
-        f"{NOTE}# Calls of Spot's API\n\nCalls that [`errand serve`](../how-to/spot-sdk.md) answers, by service of the "
-        f"directory.\n\n| service | calls |\n|---|---|\n"
+        "# Calls of Spot's API\n\nCalls that [`errand serve`](../how-to/spot-sdk.md) answers, by service of the "
+        "directory.\n\n| service | calls |\n|---|---|\n"
         + "\n".join(rows)
         + "\n\nThe directory also lists services whose "
         f"calls answer `UNIMPLEMENTED`: {listed}.\n\nMotions: {MOTIONS}\n\n"
@@ -227,9 +226,7 @@ def schema_page(page: SchemaPage) -> str:
     main = _section("The file", schema)
     example = (ROOT / page.example).read_text(encoding="utf-8")
     shown = f"## Example\n\n`{page.example}`:\n\n```yaml\n{example}```\n"
-    return (
-        f"{NOTE}# {page.title}\n\n{page.words} Unknown keys are refused.\n\n{page.more}{main}{''.join(sections)}{shown}"
-    )
+    return f"# {page.title}\n\n{page.words} Unknown keys are refused.\n\n{page.more}{main}{''.join(sections)}{shown}"
 
 
 def _reachable(schema: Mapping[str, Any], parts: Mapping[str, Any]) -> list[str]:
@@ -340,7 +337,7 @@ def skills_page() -> str:
     """The page on the skills that come with the project."""
     sections = "".join(_skill(name, skill) for name, skill in project_skills().items())
     words = "Each is registered in the entry-point group `errand.skills`, as skills of other packages are."
-    return f"{NOTE}# Skills\n\n{words}\n\n{sections}"
+    return f"# Skills\n\n{words}\n\n{sections}"
 
 
 def _skill(name: str, skill: type[Skill[Any]]) -> str:
@@ -385,7 +382,7 @@ def stack_page() -> str:
     skills = "".join(_options(f"### {name}", kind) for name, kind in skill_options().items())
     example = "planner: {use: lattice, margin_m: 0.1}\nskills:\n  navigate:\n    replans: 3\n"
     shown = f"## Example\n\n```yaml\n{example}```\n"
-    return f"{NOTE}# Stack files\n\n{words}\n\n{slots}## skills\n\n{skills}{shown}"
+    return f"# Stack files\n\n{words}\n\n{slots}## skills\n\n{skills}{shown}"
 
 
 def _slot(slot: str, group: str) -> str:
@@ -428,15 +425,15 @@ def faults_page() -> str:
         "missions by `errand run --fault` and [scenario files](scenario.md), where times are those of the robot's "
         "clock. `--random-faults N` draws among the kinds marked as random, by the run's seed."
     )
-    return f"{NOTE}# Faults by name\n\n{words}\n\n| example | effect | random |\n|---|---|---|\n{rows}\n"
+    return f"# Faults by name\n\n{words}\n\n| example | effect | random |\n|---|---|---|\n{rows}\n"
 
 
 def main() -> None:
-    """Write all pages."""
-    FOLDER.mkdir(exist_ok=True)
-    write_schemas(ROOT)
+    """Writes all pages."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER
+    folder.mkdir(parents=True, exist_ok=True)
     for name, text in pages().items():
-        (FOLDER / name).write_text(text, encoding="utf-8")
+        (folder / name).write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

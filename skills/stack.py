@@ -297,24 +297,3 @@ def _plain(options: Any) -> dict[str, Any]:
 
     data: dict[str, Any] = TypeAdapter(type(options)).dump_python(options, mode="json")
     return data
-
-
-def stack_schema() -> dict[str, Any]:
-    """Returns the JSON schema of stack files, for editors and the reference."""
-    defs: dict[str, Any] = {}
-    slots = {slot: {"anyOf": [_schema(kind, defs, name) for name, kind in components(slot).items()]} for slot in SLOTS}
-    skills = {name: _schema(kind, defs) for name, kind in skill_options().items()}
-    properties = {**slots, SKILLS: {"type": "object", "properties": skills, "additionalProperties": False}}
-    about = {"title": "RobotStack", "description": "The components of one robot, each with its options."}
-    return {**about, "type": "object", "properties": properties, "additionalProperties": False, "$defs": defs}
-
-
-def _schema(kind: type, defs: dict[str, Any], name: str | None = None) -> dict[str, Any]:
-    """Returns the schema of one options class; adds the schemas that it references to `defs`."""
-    from pydantic import TypeAdapter
-
-    schema = TypeAdapter(kind).json_schema()
-    defs.update({inner: {**part, "additionalProperties": False} for inner, part in schema.pop("$defs", {}).items()})
-    chosen = {} if name is None else {USE: {"const": name, "description": "The component's name."}}
-    properties = {**chosen, **schema.get("properties", {})}
-    return {**schema, "properties": properties, "additionalProperties": False}

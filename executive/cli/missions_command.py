@@ -15,7 +15,6 @@ from executive.words.steps import add_tasks
 from skills.inputs.outside import writing
 
 _SCHEMA: Final = "mission.schema.json"
-_FOR_EDITORS: Final = "# yaml-language-server"
 
 
 def missions() -> None:
@@ -33,9 +32,10 @@ def init(
         new = [file for file in sorted(FOLDER.glob("*.[yj]*")) if not (folder / file.name).exists()]
         for file in new:
             shutil.copyfile(file, folder / file.name)
-        schema = json.loads((FOLDER / _SCHEMA).read_text(encoding="utf-8"))
-        add_tasks(schema["$defs"]["Do"])
-        (folder / _SCHEMA).write_text(f"{json.dumps(schema, indent=2, ensure_ascii=False)}\n", encoding="utf-8")
+        for file in FOLDER.glob(_SCHEMA):  # `make env` makes it in a clone
+            schema = json.loads(file.read_text(encoding="utf-8"))
+            add_tasks(schema["$defs"]["Do"])
+            (folder / _SCHEMA).write_text(f"{json.dumps(schema, indent=2, ensure_ascii=False)}\n", encoding="utf-8")
     first = folder / next(iter(shipped_missions().values())).name
     console_for(as_json=False).print(f"{len(new)} files in {folder}; try: errand run {first}", markup=False)
 
@@ -43,4 +43,4 @@ def init(
 def _first_words(file: Path) -> str:
     """Returns the text of the first comment line in a mission file."""
     lines = file.read_text(encoding="utf-8").splitlines()
-    return next((line[1:].strip() for line in lines if line[:1] == "#" and not line.startswith(_FOR_EDITORS)), "")
+    return next((line[1:].strip() for line in lines if line[:1] == "#" and "$schema=" not in line), "")

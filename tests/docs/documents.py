@@ -10,6 +10,9 @@ from skills.inputs.plugins import OBSERVERS, installed_plugins
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
+PLUGIN_PAGES = sorted(ROOT.glob("plugins/*/docs/*.md"))
+PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md")), *PLUGIN_PAGES]
+"""All pages that are written by hand."""
 _COMMANDS = {name: shipped_command(name) for name in COMMANDS}
 _COMMANDS |= {name: plugin_command(name) for name in help_lines() if "." not in name}
 for group, short in (name.split(".") for name in help_lines() if "." in name):
@@ -41,9 +44,9 @@ def commands(page):
     return [line for line in lines if line.startswith("errand ")]
 
 
-def links(page):
-    """The links of a page that stay with us: file and anchor, each empty when it is not said."""
-    return _LINK.findall(page.read_text(encoding="utf-8"))
+def links(text):
+    """The links of a page's text that stay with us: file and anchor, each empty when it is not said."""
+    return _LINK.findall(text)
 
 
 def unknown_command(line):

@@ -9,9 +9,11 @@ import pytest
 import yaml
 
 import executive
-from tests.docs.documents import DOCS, ROOT, blocks, commands, links, unknown_command
+from tests.docs.documents import DOCS, PAGES, PLUGIN_PAGES, ROOT, blocks, commands, links, unknown_command
+from tests.docs.reference import PAGES as REFERENCE
 
-PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
+MADE = {DOCS / "reference" / name: text for name, text in REFERENCE.items()}
+"""Text of each page that is made, by the place that links name."""
 _TEST = re.compile(r"`((?:plugins/[\w-]+/)?tests/[\w/.]+\.py)(?:::(\w+)(?:\[([^\]]+)\])?)?`")
 _FILE = re.compile(r"`((?:executive|skills|plant|plugins|missions|docs)/[\w/.-]+\.(?:py|yaml|json|md))`")
 _ERRAND = re.compile(r"`(errand [^`]+)`")
@@ -25,8 +27,12 @@ def names_in(path):
     return {node.name for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef)}
 
 
+def text_of(page):
+    return MADE[page] if page in MADE else page.read_text(encoding="utf-8")
+
+
 def anchors(page):
-    headings = re.findall(r"^#+ (.*)$", page.read_text(), re.MULTILINE)
+    headings = re.findall(r"^#+ (.*)$", text_of(page), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
@@ -41,23 +47,27 @@ def missing_tests(text):
 
 
 def broken_links(page):
-    for target, anchor in links(page):
+    for target, anchor in links(text_of(page)):
         there = (page.parent / target).resolve() if target else page
-        if not there.is_file() or (anchor and anchor[1:] not in anchors(there)):
+        if not (there in MADE or there.is_file()) or (anchor and anchor[1:] not in anchors(there)):
             yield f"{target}{anchor}"
 
 
-@pytest.mark.parametrize("page", PAGES, ids=page_id)
-def test_every_test_link_file_and_command_of_a_page_exists(page):
-    text = page.read_text()
-    shown = commands(page) + _ERRAND.findall(text)
+@pytest.mark.parametrize("page", [*PAGES, *MADE], ids=page_id)
+def test_every_test_link_and_file_of_a_page_exists(page):
+    text = text_of(page)
     missing = {
         "tests": list(missing_tests(text)),
         "links": list(broken_links(page)),
         "files": [name for name in _FILE.findall(text) if not (ROOT / name).is_file()],
-        "commands": [fault for line in shown if (fault := unknown_command(line))],
     }
-    assert missing == {"tests": [], "links": [], "files": [], "commands": []}
+    assert missing == {"tests": [], "links": [], "files": []}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_id)
+def test_every_command_and_option_of_a_page_exists(page):
+    shown = commands(page) + _ERRAND.findall(text_of(page))
+    assert [fault for line in shown if (fault := unknown_command(line))] == []
 
 
 def test_the_named_poses_of_the_page_on_pictures_are_free_in_the_flat(tmp_path):
@@ -97,8 +107,8 @@ def test_every_page_is_reached_from_the_index():
         if page in reached or page.suffix != ".md":
             continue
         reached.add(page)
-        waiting += [(page.parent / target).resolve() for target, _ in links(page) if target]
-    assert set(DOCS.rglob("*.md")) <= reached
+        waiting += [(page.parent / target).resolve() for target, _ in links(text_of(page)) if target]
+    assert {*DOCS.rglob("*.md"), *PLUGIN_PAGES, *MADE} <= reached
 
 
 def nav_of(entry):
@@ -110,8 +120,10 @@ def nav_of(entry):
 
 def test_the_site_has_every_page_and_notebook():
     site = yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))
-    pages = [*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb")]
-    assert nav_of(site["nav"]) == {str(page.relative_to(DOCS).with_suffix(".md")) for page in pages}
+    pages = [
+        str(page.relative_to(DOCS).with_suffix(".md")) for page in (*DOCS.rglob("*.md"), *DOCS.rglob("*.ipynb"), *MADE)
+    ]
+    assert nav_of(site["nav"]) == {*pages, *(page_id(page) for page in PLUGIN_PAGES)}
 
 
 def test_the_site_is_built_and_loads_nothing_from_elsewhere(tmp_path):
@@ -121,3 +133,4 @@ def test_the_site_is_built_and_loads_nothing_from_elsewhere(tmp_path):
     built = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
     assert built.returncode == 0, built.stderr
     assert (tmp_path / "notebooks" / "first_look.html").is_file()
+    assert (tmp_path / "reference" / "stack.html").is_file()

@@ -11,7 +11,6 @@ from skills.navigate.skill import Navigate
 from skills.quantities import base_type, bounds
 from skills.robot import Pose2D
 from skills.stack import (
-    DEFAULT_FILE,
     SLOTS,
     StackError,
     components,
@@ -19,7 +18,6 @@ from skills.stack import (
     skill_options,
     stack_data,
     stack_of,
-    stack_schema,
 )
 from tests.project import project_skills
 from tests.tables import table
@@ -86,14 +84,3 @@ def test_every_number_of_a_port_and_of_an_option_has_a_range_that_holds_its_defa
     for field in dataclasses.fields(record):
         if field.default is not dataclasses.MISSING:
             assert conforms(field.default, field_types(record)[field.name]), field.name
-
-
-def test_the_schema_knows_every_slot_and_option():
-    schema = stack_schema()
-    assert set(SLOTS) | {"skills"} == set(schema["properties"])
-    lattice = next(
-        one for one in schema["properties"]["planner"]["anyOf"] if one["properties"]["use"]["const"] == "lattice"
-    )
-    fields = {field.name for field in dataclasses.fields(default_stack().planner)}
-    assert set(lattice["properties"]) == fields | {"use"}
-    assert DEFAULT_FILE.is_file()

@@ -1,18 +1,25 @@
 """Shipped missions by name, from any folder."""
 
 import json
+import shutil
+import sys
 from pathlib import Path
 
 import pytest
 from jsonschema import Draft202012Validator
 
 from executive.app.prepare.mission_files import mission_file, shipped_missions
+from executive.cli import missions_command
 from executive.cli.missions_command import init
 from skills.inputs.errors import InputError
 from skills.inputs.yaml_source import parse_yaml
 from tests.executive.cli.calls import done, errand
 
+sys.path.insert(0, str(Path(__file__).parents[3] / "docs"))
+from file_schemas import schema_text, schemas
+
 MISSIONS = Path(__file__).parents[3] / "missions"
+SCHEMA = "mission.schema.json"
 
 
 @pytest.fixture(autouse=True)
@@ -54,13 +61,30 @@ def test_check_and_tree_take_names():
     assert errand("tree", "go_living_room", "--format", "json").stdout.startswith('{"id": "alice/go-living-room')
 
 
-def test_init_copies_the_missions_and_overwrites_nothing(elsewhere):
+@pytest.fixture
+def shipped(tmp_path_factory, monkeypatch):
+    """The folder of the shipped missions as an installation has it, with their schema."""
+    folder = tmp_path_factory.mktemp("shipped")
+    for file in MISSIONS.glob("*.yaml"):
+        shutil.copy(file, folder)
+    (folder / SCHEMA).write_text(schema_text(schemas()[f"missions/{SCHEMA}"]), encoding="utf-8")
+    monkeypatch.setattr(missions_command, "FOLDER", folder)
+    return folder
+
+
+def test_init_copies_the_missions_and_overwrites_nothing(elsewhere, shipped):
     (elsewhere / "mine").mkdir()
     (elsewhere / "mine" / "patrol.yaml").write_text("name: mine\n")
     done("init", "mine")
     assert {file.stem for file in (elsewhere / "mine").glob("*.yaml")} == set(shipped_missions())
-    assert (elsewhere / "mine" / "mission.schema.json").read_bytes() == (MISSIONS / "mission.schema.json").read_bytes()
+    assert (elsewhere / "mine" / SCHEMA).read_bytes() == (shipped / SCHEMA).read_bytes()
     assert (elsewhere / "mine" / "patrol.yaml").read_text() == "name: mine\n"
+
+
+def test_init_copies_missions_without_a_schema_where_none_was_made(elsewhere, shipped):
+    (shipped / SCHEMA).unlink()
+    done("init", "mine")
+    assert {file.name for file in (elsewhere / "mine").iterdir()} == {file.name for file in MISSIONS.glob("*.yaml")}
 
 
 #   a step, and whether the schema takes it
@@ -76,8 +100,8 @@ def test_init_copies_the_missions_and_overwrites_nothing(elsewhere):
         ("mop: hall", False),
     ],
 )
-def test_init_writes_a_schema_that_knows_the_installed_tasks(elsewhere, house_tasks, step, fits):
+def test_init_writes_a_schema_that_knows_the_installed_tasks(elsewhere, shipped, house_tasks, step, fits):
     init(elsewhere / "mine")
-    schema = json.loads((elsewhere / "mine" / "mission.schema.json").read_text())
+    schema = json.loads((elsewhere / "mine" / SCHEMA).read_text())
     text = f"name: mine\nsteps:\n  - {step}\n"
     assert Draft202012Validator(schema).is_valid(parse_yaml(text, elsewhere).data) is fits

@@ -148,8 +148,8 @@ def spot_api_page() -> str:
     ]
     listed = ", ".join(f"`{name}`" for name in sorted(LISTED))
     return (
-        "# Calls of Spot's API\n\nCalls that [`errand serve`](../how-to/spot-sdk.md) answers, by service of the "
-        "directory.\n\n| service | calls |\n|---|---|\n"
+        "# Calls of Spot's API\n\nCalls that [`errand serve`](../../plugins/errand-spot/docs/spot-sdk.md) answers, by "
+        "service of the directory.\n\n| service | calls |\n|---|---|\n"
         + "\n".join(rows)
         + "\n\nThe directory also lists services whose "
         f"calls answer `UNIMPLEMENTED`: {listed}.\n\nMotions: {MOTIONS}\n\n"

@@ -13,10 +13,11 @@ from rover_urdf import write_package
 from typer.testing import CliRunner
 
 from executive.cli.entry import app
-from tests.docs.documents import DOCS, Block, blocks
+from tests.docs.documents import DOCS, ROOT, Block, blocks
 
 TUTORIALS = sorted((DOCS / "tutorials").glob("[0-9]*.md"))
-HOW_TO = [DOCS / "how-to" / name for name in ("own-world.md", "own-object.md", "own-robot.md", "own-task.md")]
+HOW_TO = [DOCS / "how-to" / name for name in ("own-world.md", "own-robot.md", "own-task.md")]
+HOW_TO += [ROOT / "plugins/errand-make/docs/own-object.md"]
 PAGES = [*TUTORIALS, *HOW_TO]
 
 

@@ -36,7 +36,7 @@ TWIST, POSE, STRING, TRIGGER = (
     *("geometry_msgs/msg/Twist", "geometry_msgs/msg/PoseStamped"),
     *("std_msgs/msg/String", "std_srvs/srv/Trigger"),
 )
-_MANUAL = Path(__file__).parents[3] / "docs" / "how-to" / "ros2.md"
+_MANUAL = Path(__file__).parents[1] / "docs" / "ros2.md"
 NAVIGATE, RUN = "nav2_msgs/action/NavigateToPose", "errand_msgs/action/RunMission"
 THROUGH = "nav2_msgs/action/NavigateThroughPoses"
 ACTIONS = {"navigate_to_pose": NAVIGATE, "navigate_through_poses": THROUGH, "run_mission": RUN}

@@ -402,7 +402,7 @@ def _guess(outputs: Outputs, facts: Facts) -> tuple[str, str]:
         return "it gives a map of pixels (segmentation), and no boxes", "name a network that detects objects"
     if ranks <= {4, 5}:
         return _UNFINISHED
-    hint = "export it as one of docs/how-to/own-detector.md, or bring a class of errand.detectors"
+    hint = "export it as one of plugins/errand-make/docs/own-detector.md, or bring a class of errand.detectors"
     return f"its outputs are of no layout that Errand reads (task '{facts.task[:40]}')", hint
 
 

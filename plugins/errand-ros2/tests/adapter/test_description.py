@@ -9,7 +9,7 @@ from errand_ros2.adapter.description import RobotFile, load_description
 from skills.inputs.errors import InputError
 from tests.docs.documents import ROOT
 
-PAGE = (ROOT / "docs/how-to/ros2.md").read_text()
+PAGE = (ROOT / "plugins/errand-ros2/docs/ros2.md").read_text()
 OF_THE_PAGE = [yaml.safe_load(each) for each in re.findall(r"```yaml\n(kind: .*?)```", PAGE, re.DOTALL)]
 
 

@@ -1,7 +1,7 @@
 """Recipes of objects: tables of parts with ranges in the YAML files beside this module, and their builder.
 
-`docs/dataset.md` describes the keys. A recipe draws its names (`let`), its colours and one of its kinds at random,
-and adds its parts.
+`plugins/errand-train/docs/dataset.md` describes the keys. A recipe draws its names (`let`), its colours and one of its
+kinds at random, and adds its parts.
 """
 
 from __future__ import annotations

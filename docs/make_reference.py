@@ -37,7 +37,7 @@ from plant.worlds.world import SeedRules
 from skills.api import Skill
 from skills.faults.fault_kinds import STANDARD_FAULTS
 from skills.quantities import DURATION_PATTERN
-from skills.stack import SLOTS, components, skill_options
+from skills.stack import SLOTS, components, option_fields, skill_options
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 sys.path.insert(0, str(Path(__file__).resolve().parent))
@@ -391,20 +391,10 @@ def _slot(slot: str, group: str) -> str:
 
 
 def _options(heading: str, kind: type[Any]) -> str:
-    """One component or skill: its docstring, then its options; options within options follow."""
-    rows, inner = [], []
-    hints = field_types(kind)
-    for field in dataclasses.fields(kind):
-        computed = field.default_factory
-        value = field.default if computed is dataclasses.MISSING else computed()
-        if value is dataclasses.MISSING:
-            rows.append(f"| `{field.name}` | {_type(hints[field.name])} | required |")
-        elif dataclasses.is_dataclass(value):
-            inner.append(_options(f"{heading}.{field.name}", type(value)))
-        else:
-            rows.append(f"| `{field.name}` | {_type(hints[field.name])} | `{value}` |")
+    """Returns one component or skill: its docstring, then its options; those within an option have its name first."""
+    rows = [f"| `{name}` | {_type(hint)} | `{value}` |" for name, hint, value in option_fields(kind)]
     table = "| option | type | default |\n|---|---|---|\n" + "\n".join(rows) + "\n\n" if rows else ""
-    return f"{heading}\n\n{_paragraph(kind)}\n\n{table}{''.join(inner)}"
+    return f"{heading}\n\n{_paragraph(kind)}\n\n{table}"
 
 
 def _paragraph(kind: type[Any]) -> str:

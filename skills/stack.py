@@ -8,7 +8,7 @@ a stack file may set, its docstring explains them, and it implements the slot's 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import EntryPoint
@@ -231,6 +231,25 @@ def skill_options() -> Mapping[str, type]:
     """Returns the options class of each installed skill that can be loaded and has options."""
     found = {name: _options_of(name) for name in sorted({entry.name for entry in installed_plugins(SKILL_GROUP)})}
     return MappingProxyType({name: kind for name, kind in found.items() if kind is not None})
+
+
+def option_kinds() -> Mapping[str, Sequence[tuple[str, type]]]:
+    """Returns headings and options classes by the name of a slot, of a component or of a skill; all stand under ""."""
+    kinds = [((slot, use), kind) for slot in SLOTS for use, kind in components(slot).items()]
+    kinds += [((SKILLS, name), kind) for name, kind in skill_options().items()]
+    names = ("", *(name for keys, _ in kinds for name in keys))
+    return {name: [(" ".join(keys), kind) for keys, kind in kinds if name in ("", *keys)] for name in names}
+
+
+def option_fields(record: type, prefix: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Yields name, type and default of each field; the fields of an inner dataclass follow with its name and a dot."""
+    for each in dataclasses.fields(record):
+        value = each.default if each.default_factory is dataclasses.MISSING else each.default_factory()
+        if dataclasses.is_dataclass(value):
+            yield from option_fields(type(value), f"{prefix}{each.name}.")
+        else:
+            hint = get_type_hints(record, include_extras=True)[each.name]
+            yield f"{prefix}{each.name}", hint, "required" if value is dataclasses.MISSING else value
 
 
 @cache

@@ -10,7 +10,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from importlib.metadata import distributions, requires, version
 from typing import Annotated, Final
@@ -172,13 +172,4 @@ def _folder() -> Iterator[Finding]:
         yield Finding("folder of runs", True if not mend else None, f"{out}, {free_gb:.0f} GB free", mend)
 
 
-_LOOKS: Final[Sequence[Callable[[], Iterator[Finding]]]] = (
-    _python,
-    _packages,
-    _rendering,
-    _machine,
-    _compiled,
-    _ports,
-    _plugins,
-    _folder,
-)
+_LOOKS: Final = (_python, _packages, _rendering, _machine, _compiled, _ports, _plugins, _folder)

@@ -36,17 +36,10 @@ class NumberReader:
             raise OutOfRangeError(f"{error.what}; {error.hint}") from error
 
 
-def quantity_option(hint: Any, *names: str, help: str, show_default: bool = True, group: str | None = None) -> Any:
+def quantity_option(hint: Any, *names: str, group: str | None = None, **settings: Any) -> Any:
     """Returns a typer option that takes a number of a quantity; `group` is the option's heading in the help."""
-    reader = NumberReader(hint)
-    return typer.Option(
-        *names,
-        parser=reader,
-        metavar=f"<{range_text(hint).removeprefix('from ')}>",
-        help=help,
-        show_default=show_default,
-        rich_help_panel=group,
-    )
+    metavar = f"<{range_text(hint).removeprefix('from ')}>"
+    return typer.Option(*names, parser=NumberReader(hint), metavar=metavar, rich_help_panel=group, **settings)
 
 
 def quantity_argument(hint: Any, *, metavar: str, help: str) -> Any:

@@ -47,30 +47,17 @@ ANYWAY = Annotated[bool, grouped(Group.REQUEST, "--anyway", help="Begin in spite
 AS_JSON = Annotated[bool, grouped(Group.OUTPUT, "--json", help="The last line of the output is the result as JSON.")]
 """Type of a parameter for the option `--json`, by default False."""
 QUIET = Annotated[bool, grouped(Group.OUTPUT, "--quiet", help="Show no lines and no tree during the run.")]
-VIEW = Annotated[
-    float | None,
-    grouped(
-        Group.PAGE,
-        _VIEW,
-        metavar="[SECONDS]",
-        parser=NumberReader(Wait),
-        help="Serve a live page, which stays after the end: so long, or until Ctrl-C.",
-    ),
-]
+_SERVED = "Serve a live page, which stays after the end: so long, or until Ctrl-C."
+_STAY = grouped(Group.PAGE, _VIEW, metavar="[SECONDS]", parser=NumberReader(Wait), help=_SERVED)
+VIEW = Annotated[float | None, _STAY]
 PORT = Annotated[int, quantity_option(Port, help="Port of the page; 0 takes a free one.", group=Group.PAGE)]
 """Type of a parameter `view_port` for the option `--view-port`, by default 0."""
 HOST = Annotated[str, grouped(Group.PAGE, metavar="HOST", help="Address of the page; 0.0.0.0 lets other machines in.")]
 """Type of a parameter `view_host` for the option `--view-host`, by default 127.0.0.1."""
 
-ROBOT = Annotated[
-    str | None,
-    grouped(
-        Group.ROBOTS,
-        "--robot",
-        metavar="ADDRESS[?OPTION=VALUE&...]",
-        help="Drive a real robot in the map of --world, such as spot://HOST?power_on=yes; needs its plug-in.",
-    ),
-]
+_DRIVEN = "Drive a real robot in the map of --world, such as spot://HOST?power_on=yes; needs its plug-in."
+_ADDRESS = grouped(Group.ROBOTS, "--robot", metavar="ADDRESS[?OPTION=VALUE&...]", help=_DRIVEN)
+ROBOT = Annotated[str | None, _ADDRESS]
 _OBSERVED = "Let an observer join the run: NAME=VALUE, or --NAME [VALUE], as in --foxglove [HOST:PORT] for Foxglove."
 OBSERVE = Annotated[list[str] | None, grouped(Group.PAGE, "--observe", metavar="NAME", help=_OBSERVED)]
 
@@ -216,12 +203,7 @@ def _runs() -> list[str]:
     return sorted((str(file.parent) for file in runs_folder().glob("*/run.json")), reverse=True)
 
 
-_NAMES: Final[dict[str, Callable[[], Iterable[str]]]] = {
-    "file": shipped_missions,
-    "files": shipped_missions,
-    "world": _worlds,
-    "run": _runs,
-}
+_NAMES: Final = {"file": shipped_missions, "files": shipped_missions, "world": _worlds, "run": _runs}
 
 
 def items_of(parameter: str, typed: str) -> list[CompletionItem]:

@@ -77,18 +77,11 @@ def progress_bar(console: Console, what: str, total: int, *, lines: bool = False
 
         yield tell
         return
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
+    from rich import progress
 
-    done = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    columns = (*done, TimeRemainingColumn(), TextColumn("left"))
-    with Progress(*columns, console=console, transient=True, refresh_per_second=BAR_REFRESH_HZ) as bar:
+    columns = (progress.TextColumn("{task.description}"), progress.BarColumn(), progress.MofNCompleteColumn())
+    times = (progress.TimeElapsedColumn(), progress.TimeRemainingColumn(), progress.TextColumn("left"))
+    with progress.Progress(*columns, *times, console=console, transient=True, refresh_per_second=BAR_REFRESH_HZ) as bar:
         task = bar.add_task(what, total=total)
         yield lambda following=None, **new: bar.update(task, advance=1, description=following, **new)
 

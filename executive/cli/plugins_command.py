@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import EntryPoint, version
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import NamedTemporaryFile
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -33,10 +34,19 @@ from plant.robots import robot_kind as kinds
 from plant.worlds.world import load_world
 from skills.class_forms import class_forms
 from skills.inputs import plugins as loading
-from skills.inputs.errors import InputError
+from skills.inputs.errors import InputError, suggestion
 from skills.inputs.yaml_source import yaml_of
 from skills.quantities import Duration
-from skills.stack import BACKENDS, DOORS, SLOTS, is_frozen_dataclass, stack_data, stack_file
+from skills.stack import (
+    BACKENDS,
+    DOORS,
+    SLOTS,
+    is_frozen_dataclass,
+    option_fields,
+    option_kinds,
+    stack_data,
+    stack_file,
+)
 
 _WORKERS: Final = 4
 _WORD: Final = re.compile(r"[a-z][a-z0-9_-]*")
@@ -79,9 +89,20 @@ def plugins(
     finish({"plugins": [asdict(each) for each in found]}, as_json, good=not any(each.broken for each in found))
 
 
-def skills(as_json: AS_JSON = False) -> None:
-    """Lists the installed skills: what each does, and the inputs that a step of a mission file gives it by `with`."""
+def skills(
+    skill: Annotated[str, typer.Argument(metavar="[SKILL]", help="One skill, whole.", show_default=False)] = "",
+    as_json: AS_JSON = False,
+) -> None:
+    """Lists the installed skills: what each does, and the inputs that a step of a mission file gives it by `with`.
+
+    Of one skill it prints the whole text, the default of each input, the outputs and the causes of failure.
+    """
     found = registry.installed_skills()
+    if skill:
+        kind = _named(skill, found)
+        others = [(port, hint, "output") for port, hint in kind.outputs.items()]
+        others += [(cause.value, "failure", why) for cause, why in kind.causes.items()]
+        return _show_whole(skill, kind, [*option_fields(kind.Inputs), *others])
     rows, values = list[tuple[str, ...]](), list[dict[str, object]]()
     for name, kind in found.items():
         about = (kind.__doc__ or "").partition("\n")[0]
@@ -90,7 +111,21 @@ def skills(as_json: AS_JSON = False) -> None:
         values.append({"skill": name, "about": about, "inputs": inputs, "module": kind.__module__})
     rows += [(name, f"broken: {error.message}", "") for name, error in found.broken.items()]
     show_table(console_for(as_json), ("skill", "what it does", "inputs"), rows)
-    finish({"skills": values}, as_json, good=not found.broken)
+    return finish({"skills": values}, as_json, good=not found.broken)
+
+
+def _named(name: str, known: Mapping[str, Any]) -> Any:
+    """Returns the value of a name. Raises InputError for a name that is not known."""
+    if name not in known:
+        raise InputError(f"there is no '{name}'", hint=suggestion(name, known))
+    return known[name]
+
+
+def _show_whole(name: str, kind: type, rows: Iterable[tuple[str, Any, Any]]) -> None:
+    """Prints a name, the docstring of its class, and a table of names with their types and defaults."""
+    typer.echo(f"{name}: {inspect.cleandoc(kind.__doc__ or '')}\n")
+    words = [(port, describe_type(hint), str(default)) for port, hint, default in rows]
+    show_table(console_for(as_json=False), ("name", "type", "default"), words)
 
 
 def _rows(found: Sequence[Plugin]) -> Iterator[tuple[str, ...]]:
@@ -224,6 +259,14 @@ def _group() -> None:
 
 @stack.command()
 @takes_request("stack")
-def show(request: Request) -> None:
+def show(
+    request: Request,
+    name: Annotated[str, typer.Argument(metavar="[NAME]", help="A slot, component or skill.", show_default=False)] = "",
+    options: Annotated[bool, typer.Option("--options", help="Say what each option takes.")] = False,
+) -> None:
     """Prints a stack with all its options as YAML, which --stack takes again."""
-    typer.echo(yaml_of(stack_data(load_stack(request.stack)), flow_style=False), nl=False)
+    data = stack_data(load_stack(request.stack))
+    for heading, kind in _named(name, option_kinds()) if options else ():
+        _show_whole(heading, kind, option_fields(kind))
+    if not options:
+        typer.echo(yaml_of({name: _named(name, data)} if name else data, flow_style=False), nl=False)

@@ -1,5 +1,6 @@
 """`errand doctor` finds what a run lacks, and names the mend."""
 
+import re
 import socket
 import subprocess
 
@@ -76,3 +77,26 @@ def test_skills_are_listed_with_their_inputs():
     speak = next(each for each in json_of(result)["skills"] if each["skill"] == "speak")
     assert (speak["inputs"], speak["about"][:17]) == ({"text": "text"}, "Says a text once,")
     assert "stow" in errand("skills").stdout
+
+
+#   arguments of a command, and lines that it prints (columns two spaces apart)
+@pytest.mark.parametrize(
+    ("words", "lines"),
+    [
+        (["skills", "speak"], ["speak: Says a text once", "text  text  required"]),
+        (["skills", "stow"], ["PLANNING  failure  the arm finds no free path"]),
+        (["stack", "show", "planner"], ["planner:", "use: lattice"]),
+        (["stack", "show", "planner", "--options"], ["planner lattice: ", "margin_m  number from 0 to 10 m  0.06"]),
+        (["stack", "show", "lattice", "--options"], ["planner lattice: "]),
+        (["stack", "show", "navigate", "--options"], ["skills navigate: ", "doors.reach_m  number above 0"]),
+    ],
+)
+def test_one_skill_or_component_is_printed_whole(words, lines):
+    shown = re.sub(r" {2,}", "  ", errand(*words).stdout)
+    assert [line for line in lines if line not in shown] == []
+
+
+@pytest.mark.parametrize("words", [["skills", "navigat"], ["stack", "show", "navigat", "--options"]])
+def test_an_unknown_name_is_refused_with_the_nearest(words):
+    ended = errand(*words)
+    assert (ended.exit_code, ended.stderr) == (2, "errand: there is no 'navigat'; did you mean 'navigate'?\n")

@@ -13,6 +13,7 @@ from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+import figures
 from make_reference import pages as reference_pages
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -36,8 +37,12 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Any, files: Files, **_: Any) -> str:
-    """Lets links that lead to a file of the repository lead to its page."""
-    return _LINK.sub(lambda found: f"]({_site_target(found[1], page.file.src_uri, files)}{found[2] or ''})", markdown)
+    """Puts the quoted figures in, and lets links that lead to a file of the repository lead to its page."""
+    try:
+        text = figures.quoted(markdown)
+    except figures.UnknownFigureError as error:
+        raise PluginError(f"{page.file.src_uri}: {error}") from error
+    return _LINK.sub(lambda found: f"]({_site_target(found[1], page.file.src_uri, files)}{found[2] or ''})", text)
 
 
 def _site_target(target: str, source: str, files: Files) -> str:

@@ -237,7 +237,7 @@ def _existence(detected: Detection3D) -> float:
 def _evidence(detected: Detection3D) -> float:
     """Likelihood ratio of a detection with and without an object.
 
-    Assumes that a score is the fraction of correct detections, as it nearly is (docs/finding-things.md).
+    Assumes that a score is the fraction of correct detections, as it nearly is (docs/detecting.md).
     """
     ratio = _odds(_existence(detected)) / _odds(_SEEN_BY_CHANCE)
     return math.pow(ratio, NEW_IN_A_VIEW)

@@ -10,10 +10,10 @@ A benchmark draws cases, runs each of them in a folder of its own, and sums up t
         benchmark(cases, run_case, summary)
 
 The parameters of `cases`, and those of `summary` but the first, are options of the command line. All benchmarks have
-`--jobs` (processes), `--json` (figures on one line) and `--out`, a folder that stores the results and the files of the
-cases: after an interruption the same command goes on there. Results are stored as JSON; a summary reads their fields as
-attributes. `command(measure)` does the same for a function without cases. What a summary or a measure returns is
-printed; an integer is the exit code.
+`--jobs` (processes), `--json` (figures on one line), `--figures` (a file that pages quote) and `--out`, a folder that
+stores the results and the files of the cases: after an interruption the same command goes on there. Results are stored
+as JSON; a summary reads their fields as attributes. `command(measure)` does the same for a function without cases. What
+a summary or a measure returns is printed; an integer is the exit code.
 """
 
 import argparse
@@ -33,6 +33,8 @@ from typing import Literal, get_args, get_origin
 
 import numpy as np
 
+from tests.benchmarks.figures import write_figures
+
 
 def command(*functions):
     """Calls a function with the options of the command line; of several functions the first argument names one."""
@@ -44,12 +46,15 @@ def command(*functions):
         for parameter in _parameters(each).values():
             _add_option(own, parameter)
         own.add_argument("--json", action="store_true", help="figures on one line")
+        own.add_argument("--figures", metavar="NAME", help="store them as docs/figures/NAME.json, which pages quote")
         own.set_defaults(function=each)
     options = vars(parser.parse_args())
-    function, on_one_line = options.pop("function"), options.pop("json")
+    function, on_one_line, name = (options.pop(key) for key in ("function", "json", "figures"))
     figures = function(**options)
     if isinstance(figures, int):
         raise SystemExit(figures)
+    if name is not None:
+        tell(f"written to {write_figures(name, json.loads(json.dumps(figures, default=_plain)), options)}")
     if figures is not None:
         show(figures, indent=None if on_one_line else 1)
 

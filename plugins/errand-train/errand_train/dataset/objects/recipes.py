@@ -1,6 +1,6 @@
 """Recipes of objects: tables of parts with ranges in the YAML files beside this module, and their builder.
 
-`plugins/errand-train/docs/dataset.md` describes the keys. A recipe draws its names (`let`), its colours and one of its
+`plugins/errand-train/docs/training.md` describes the keys. A recipe draws its names (`let`), its colours and one of its
 kinds at random, and adds its parts.
 """
 

@@ -56,7 +56,7 @@ def origin(data: dict[str, Any]) -> str:
     facts = [
         f"`{data['command']}`" if data["command"] else "command not recorded",
         f"seeds {data['seeds']}" if data["seeds"] else "",
-        data["date"] or (f"told since {data['recorded']}" if data.get("recorded") else ""),
+        data["date"] or (f"written down {data['recorded']}" if data.get("recorded") else ""),
         data["machine"] or "",
         f"commit {data['commit']}" if data["commit"] else "",
         f"not recorded: {', '.join(missing)}" if missing else "",

@@ -1,4 +1,4 @@
-"""The tutorials and four how-to pages do what they say: files are written, commands run, the shown output comes."""
+"""The tutorials, the first hour and four how-to pages do what they say: files are written, commands run, the shown output comes."""
 
 import contextlib
 import os
@@ -18,6 +18,7 @@ from tests.docs.documents import DOCS, ROOT, Block, blocks
 TUTORIALS = sorted((DOCS / "tutorials").glob("[0-9]*.md"))
 HOW_TO = [DOCS / "how-to" / name for name in ("own-world.md", "own-robot.md", "own-task.md")]
 HOW_TO += [ROOT / "plugins/errand-make/docs/own-object.md"]
+HOW_TO += [DOCS / "first-hour.md"]
 PAGES = [*TUTORIALS, *HOW_TO]
 
 

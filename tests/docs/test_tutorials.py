@@ -1,4 +1,4 @@
-"""The tutorials, the first hour and four how-to pages do what they say: files are written, commands run, the shown output comes."""
+"""Tutorials, the first hour and four how-to pages do as they say: files are written, commands run, output comes."""
 
 import contextlib
 import os

@@ -44,7 +44,7 @@ def reason(line):
 def wrapped(line):
     """The line, with what presses Ctrl-C after some time where it would not end."""
     seconds = next((s for pattern, s in TABLE["stopped"].items() if re.search(pattern, line)), None)
-    return line if seconds is None else f"timeout --preserve-status --signal=INT {seconds} {line}"
+    return line if seconds is None else f"timeout --foreground --preserve-status --signal=INT {seconds} {line}"
 
 
 RUN = {page: [line for line in lines_of(page) if reason(line) is None] for page in OTHERS}

@@ -67,7 +67,7 @@ class PartActions:
 
     def _feedback(self, server: ActionServer, goal: Goal) -> Fields:
         """Fields of the feedback on a goal: where the joints are, or the gripper."""
-        if server.kind.name == GRIPPER:
+        if server.kind == GRIPPER:
             reading = self._robot.gripper()
             return {"position": self._share * reading.opening, "effort": reading.force_n}
         names, joints = goal.message.trajectory.joint_names, self._robot.joints()
@@ -124,7 +124,7 @@ class PartActions:
 
     def _end(self, server: ActionServer, goal: Goal, status: CommandStatus) -> None:
         done = status.state is CommandState.DONE
-        if server.kind.name == TRAJECTORY:
+        if server.kind == TRAJECTORY:
             code = 0 if done else INVALID_GOAL if status.cause is CommandCause.INVALID else PATH_VIOLATED
             result = {"error_code": code, "error_string": status.reason}
         else:

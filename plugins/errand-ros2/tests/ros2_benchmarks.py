@@ -31,7 +31,7 @@ from errand_ros2.bridge import Bridge
 from errand_ros2.server import RobotServer
 from errand_ros2.wire.node import Place
 from errand_ros2.wire.session import open_session
-from errand_ros2.wire.types import ActionType, Attachment, ros_types
+from errand_ros2.wire.types import Attachment, ros_types
 from executive import Request
 from executive.app.prepare.from_request import prepare
 from executive.app.prepare.placed_robots import only_robot
@@ -157,17 +157,18 @@ def tell(rows, limit_s):
 
 
 def cancel(count):
-    types, action = ros_types(), ActionType(ros_types(), "nav2_msgs/action/NavigateToPose")
+    types, kind = ros_types(), "nav2_msgs/action/NavigateToPose"
 
     def client(place, bridge):
         with open_session(place) as session:
             watch, base, rows, reached = Watch(session), "/alice/navigate_to_pose/_action", [], 0
-            names = {"send_goal": action.send_goal, "get_result": action.get_result, "cancel_goal": action.cancel_goal}
-            send, result, stop = (watch.node.client(f"{base}/{name}", kind) for name, kind in names.items())
+            names = {"send_goal": f"{kind}_SendGoal", "get_result": f"{kind}_GetResult"}
+            names |= {"cancel_goal": "action_msgs/srv/CancelGoal"}
+            send, result, stop = (watch.node.client(f"{base}/{name}", each) for name, each in names.items())
             watch.wait_for(-1.0, 120.0)
             for number in range(2 * count):
                 x, y, yaw = GOALS[number // 2 % 2]
-                goal = types.make("nav2_msgs/action/NavigateToPose_Goal")
+                goal = types.make(f"{kind}_Goal")
                 goal.pose.header.frame_id, at = "map", goal.pose.pose
                 at.position.x, at.position.y = x, y
                 at.orientation.w, at.orientation.z = math.cos(yaw / 2), math.sin(yaw / 2)
@@ -193,7 +194,7 @@ SENDER = """
 import sys, time
 from errand_ros2.wire.node import Place
 from errand_ros2.wire.session import open_session
-from errand_ros2.wire.types import ActionType, ros_types
+from errand_ros2.wire.types import ros_types
 
 with open_session(Place(port=int(sys.argv[1]))) as session:
     kind = "geometry_msgs/msg/Twist"

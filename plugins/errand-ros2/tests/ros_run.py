@@ -20,7 +20,7 @@ from ros_lock_step import restore, state_of
 from errand_ros2.bridge import Bridge
 from errand_ros2.wire.node import Place
 from errand_ros2.wire.session import open_session
-from errand_ros2.wire.types import ActionType, ros_types
+from errand_ros2.wire.types import ros_types
 from executive import Request
 from executive.app.prepare.from_request import prepare
 from executive.app.runs.one_run import run_request
@@ -216,7 +216,7 @@ class RosClient:
         return [each["what"] for each in self.events("control")]
 
     def call(self, name):
-        return self.node.client(f"/alice/{name}", ros_types().service(TRIGGER)).call({}, limit_s=PATIENCE_S)
+        return self.node.client(f"/alice/{name}", TRIGGER).call({}, limit_s=PATIENCE_S)
 
     def publisher(self, topic, kind):
         made = self.node.publisher(topic, kind)
@@ -261,18 +261,18 @@ class ActionClient:
     """Client of an action, which sends one goal."""
 
     def __init__(self, ros, name, kind=None):
-        self.ros, self.kind = ros, ActionType(ros_types(), kind or ACTIONS[name])
+        self.ros, self.kind = ros, kind or ACTIONS[name]
         base = f"/alice/{name}/_action"
-        self._send = ros.node.client(f"{base}/send_goal", self.kind.send_goal)
-        self._result = ros.node.client(f"{base}/get_result", self.kind.get_result)
-        self._cancel = ros.node.client(f"{base}/cancel_goal", self.kind.cancel_goal)
+        self._send = ros.node.client(f"{base}/send_goal", f"{self.kind}_SendGoal")
+        self._result = ros.node.client(f"{base}/get_result", f"{self.kind}_GetResult")
+        self._cancel = ros.node.client(f"{base}/cancel_goal", "action_msgs/srv/CancelGoal")
         self._feedback, self.feedback = f"{base}/feedback", []
         self.identity = {"uuid": np.frombuffer(uuid.uuid4().bytes, np.uint8)}
-        self.goal = ros_types().make(f"{self.kind.name}_Goal")
+        self.goal = ros_types().make(f"{self.kind}_Goal")
 
     def follow(self):
         """Collects the feedback."""
-        self.ros.node.subscribe(self._feedback, self.kind.feedback_message.name, self.feedback.append)
+        self.ros.node.subscribe(self._feedback, f"{self.kind}_FeedbackMessage", self.feedback.append)
         return self
 
     def send(self):

@@ -30,6 +30,7 @@ from ros_run import (
 from errand_ros2.bridge import observe
 from errand_ros2.wire.actions import GoalStatus
 from errand_ros2.wire.types import LATCHED, older_types, ros_types
+from errand_ros2.wire.zenoh_node import ZenohClient
 from executive.run.control import Control
 from skills.inputs.errors import InputError
 from skills.navigate.follower import FollowerOptions
@@ -91,10 +92,10 @@ def test_a_goal_of_navigate_to_pose_is_reached(ros):
 
 def test_a_client_of_an_older_distribution_gets_the_result_in_its_form(ros):
     action, older = ActionClient(ros, "navigate_to_pose"), older_types().service(f"{NAVIGATE}_GetResult")
-    assert older.key != action.kind.get_result.key
+    assert older.key != ros_types().service(f"{NAVIGATE}_GetResult").key
     action.goal.pose = stamped(0.3, 0.0)
     assert action.send()
-    client = ros.node.client("/alice/navigate_to_pose/_action/get_result", older)
+    client = ZenohClient(ros.node, "/alice/navigate_to_pose/_action/get_result", older)
     result = ros.meanwhile(lambda: client.call({"goal_id": action.identity}, limit_s=60.0))
     assert (result.status, result.result.error_code) == (GoalStatus.SUCCEEDED, 0)
     assert not hasattr(result.result, "error_msg")
@@ -116,7 +117,7 @@ def test_a_goal_of_navigate_through_poses_passes_them_in_order(ros):
 def test_a_client_of_jazzy_sends_poses_in_its_form(ros):
     send = older_types().service(f"{THROUGH}_SendGoal")
     identity = {"uuid": np.frombuffer(uuid.uuid4().bytes, np.uint8)}
-    client = ros.node.client("/alice/navigate_through_poses/_action/send_goal", send)
+    client = ZenohClient(ros.node, "/alice/navigate_through_poses/_action/send_goal", send)
     poses = [stamped(0.3, 0.0), stamped(0.3, -0.3)]
     assert client.call({"goal_id": identity, "goal": {"poses": poses}}, limit_s=20.0).accepted
     ros.soon(lambda: ros.events("outcome"))
@@ -138,7 +139,7 @@ def test_detections_are_boxes_in_pixels(ros):
 
 def test_a_viewer_asks_for_the_tree_and_sees_its_changes(ros):
     kind = "py_trees_ros_interfaces/srv/OpenSnapshotStream"
-    opened = ros.node.client("/alice/tree/snapshot_streams/open", ros_types().service(kind)).call({}, limit_s=5.0)
+    opened = ros.node.client("/alice/tree/snapshot_streams/open", kind).call({}, limit_s=5.0)
     heard = ros.hear(opened.topic_name, "py_trees_ros_interfaces/msg/BehaviourTree", LATCHED)
     ros.soon(lambda: heard)
     assert [each.name for each in heard[0].behaviours if each.is_active][-1].startswith("wait")
@@ -326,7 +327,7 @@ def test_a_goal_in_any_frame_that_the_robot_carries_is_accepted(ros, frame):
 
 @pytest.mark.parametrize("name", ["/amcl", "/alice/amcl", "/bt_navigator", "/alice/bt_navigator"])
 def test_nodes_of_nav2_are_active_while_a_mission_lasts(ros, name):
-    kind = ros_types().service("lifecycle_msgs/srv/GetState")
+    kind = "lifecycle_msgs/srv/GetState"
     assert ros.node.client(f"{name}/get_state", kind).call({}, limit_s=5.0).current_state.label == "active"
 
 

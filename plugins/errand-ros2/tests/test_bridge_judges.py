@@ -15,7 +15,7 @@ from ros_run import ACTIONS, POSE, STRING, TRIGGER, TWIST, ActionClient, run_of_
 from errand_ros2.wire.actions import GoalStatus
 from errand_ros2.wire.node import Place
 from errand_ros2.wire.session import open_session
-from errand_ros2.wire.types import ActionType, Attachment, older_services, ros_types
+from errand_ros2.wire.types import Attachment, ros_types, service_forms
 from skills.navigate.follower import FollowerOptions
 
 INPUTS = {"goal_pose": POSE, "cmd_vel": TWIST, "initialpose": "geometry_msgs/msg/PoseWithCovarianceStamped"}
@@ -105,10 +105,10 @@ def services_of():
     """Services of a run of Alice, with their types, in all forms."""
     found = [(f"/alice/{name}", ros_types().service(TRIGGER)) for name in ("pause", "resume", "step", "cancel")]
     for name, kind in ACTIONS.items():
-        action, base = ActionType(ros_types(), kind), f"/alice/{name}/_action"
-        found.append((f"{base}/cancel_goal", action.cancel_goal))
-        for part, service in (("send_goal", action.send_goal), ("get_result", action.get_result)):
-            found += [(f"{base}/{part}", each) for each in (service, *older_services(service))]
+        base = f"/alice/{name}/_action"
+        found.append((f"{base}/cancel_goal", ros_types().service("action_msgs/srv/CancelGoal")))
+        for part, service in (("send_goal", "SendGoal"), ("get_result", "GetResult")):
+            found += [(f"{base}/{part}", each) for each in service_forms(f"{kind}_{service}")]
     return found
 
 
@@ -194,7 +194,7 @@ def test_goals_and_poses_with_wrong_bytes_leave_a_run_that_answers(tmp_path, cap
                 message = types.message(kind)
                 session.put(ros.node.key.data_key(topic, message.key), changed(message.encode(messages[topic])))
             for name, goal in goals.items():
-                send = ActionType(types, ACTIONS[name]).send_goal
+                send = types.service(f"{ACTIONS[name]}_SendGoal")
                 asked = {"goal_id": {"uuid": np.frombuffer(chance.bytes(16), np.uint8)}, "goal": goal}
                 key = ros.node.key.data_key(f"/alice/{name}/_action/send_goal", send.key)
                 session.get(key, timeout=0.2, payload=changed(send.request.encode(asked)), attachment=head)

@@ -129,7 +129,7 @@ def test_a_client_moves_arm_and_gripper_in_the_plant_and_sees_depth_and_costs():
 @pytest.mark.nightly
 def test_a_client_watches_the_tree_and_the_objects_of_a_search():
     def says(ros):
-        opener = ros.node.client("/alice/tree/snapshot_streams/open", ros_types().service(OPEN))
+        opener = ros.node.client("/alice/tree/snapshot_streams/open", OPEN)
         trees = ros.hear(opener.call({}, limit_s=PATIENCE_S).topic_name, TREE)
         objects = ros.hear("/alice/objects", "visualization_msgs/msg/MarkerArray")
         search = ActionClient(ros, "run_mission")

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from errand_ros2.wire.node import Node, Request
-from errand_ros2.wire.types import LATCHED, ActionType, older_services, ros_types
+from errand_ros2.wire.types import LATCHED, ros_types
 
 MOST_GOALS, _RESULT_S = 64, 3600.0  # goals whose results are kept; time for which a client waits for a result
-_REJECTED, _UNKNOWN_GOAL, _TERMINATED = 1, 2, 3  # answers to a request to cancel goals (action_msgs/srv/CancelGoal)
-
+_CANCEL = "action_msgs/srv/CancelGoal"
+_REJECTED, _UNKNOWN_GOAL, _TERMINATED = 1, 2, 3  # its answers
 
 GoalStatus = IntEnum("GoalStatus", "UNKNOWN ACCEPTED EXECUTING CANCELING SUCCEEDED CANCELED ABORTED", start=0)
 """Status of a goal (action_msgs/msg/GoalStatus); from SUCCEEDED on it has ended."""
@@ -54,17 +54,15 @@ class ActionServer:
         self, node: Node, name: str, kind: str, pool: Executor, accept: Callable[..., bool], cancel: Callable[..., Any]
     ) -> None:
         """`accept`, which the `pool` calls, returns whether a goal is pursued; `cancel` begins to end one."""
-        self.kind, self._lock = ActionType(ros_types(), kind), threading.RLock()
+        self.kind, self._lock = kind, threading.RLock()
         self._accept, self._cancel = accept, cancel
         self._goals: dict[bytes, Goal] = {}
         base = f"{node.absolute(name)}/_action"
-        self._feedback = node.publisher(f"{base}/feedback", self.kind.feedback_message.name)
-        self._status = node.publisher(f"{base}/status", self.kind.status.name, LATCHED)
-        node.serve(f"{base}/cancel_goal", self.kind.cancel_goal, self._cancel_goal)
-        for each in (self.kind.send_goal, *older_services(self.kind.send_goal)):
-            node.serve(f"{base}/send_goal", each, node.later(pool, self._send_goal))
-        for each in (self.kind.get_result, *older_services(self.kind.get_result)):
-            node.serve(f"{base}/get_result", each, self._get_result)
+        self._feedback = node.publisher(f"{base}/feedback", f"{kind}_FeedbackMessage")
+        self._status = node.publisher(f"{base}/status", "action_msgs/msg/GoalStatusArray", LATCHED)
+        node.serve(f"{base}/cancel_goal", _CANCEL, self._cancel_goal)
+        node.serve(f"{base}/send_goal", f"{kind}_SendGoal", node.later(pool, self._send_goal))
+        node.serve(f"{base}/get_result", f"{kind}_GetResult", self._get_result)
 
     def begin(self, goal: Goal) -> None:
         """Records that a goal is being pursued."""
@@ -145,7 +143,7 @@ class ActionServer:
 
     def _result(self, **fields: Any) -> Any:
         """Returns a result in the form of the newest distribution; older clients get the fields that they know."""
-        return ros_types().make(f"{self.kind.name}_Result", **fields)
+        return ros_types().make(f"{self.kind}_Result", **fields)
 
 
 class NoAnswerError(RuntimeError):
@@ -166,11 +164,10 @@ class ActionClient:
     """Client of one action."""
 
     def __init__(self, node: Node, name: str, type_name: str) -> None:
-        kind, base = ActionType(ros_types(), type_name), f"{node.absolute(name)}/_action"
-        self.ended = 0  # number of the goals whose result has come
-        self._send = node.client(f"{base}/send_goal", kind.send_goal)
-        self._cancel = node.client(f"{base}/cancel_goal", kind.cancel_goal)
-        self._result = node.client(f"{base}/get_result", kind.get_result)
+        self.ended, base = 0, f"{node.absolute(name)}/_action"  # number of the goals whose result has come
+        self._send = node.client(f"{base}/send_goal", f"{type_name}_SendGoal")
+        self._cancel = node.client(f"{base}/cancel_goal", _CANCEL)
+        self._result = node.client(f"{base}/get_result", f"{type_name}_GetResult")
 
     def send(self, goal: Any, *, limit_s: float) -> SentGoal | None:
         """Sends a goal or its fields; returns None when the server rejects it. Raises NoAnswerError."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any, Final, Protocol, cast
 
-from errand_ros2.wire.types import USUAL, MalformedError, MessageType, Qos, ServiceType, ros_types, topic_name
+from errand_ros2.wire.types import USUAL, MalformedError, MessageType, Qos, topic_name
 from skills.inputs.errors import InputError
 
 _LOG: Final = logging.getLogger(__name__)
@@ -109,6 +109,8 @@ class Node(ABC):
     Handlers are called in threads of the wire.
     """
 
+    padding = 0  # bytes that the wire may add to a message
+
     def __init__(self, namespace: str) -> None:
         self.namespace = "/" if namespace == "/" else topic_name(namespace)
         self.types = defaultdict[str, list[str]](list)  # of the topics that are subscribed to
@@ -130,11 +132,11 @@ class Node(ABC):
         """Calls `handle` with each message that is not `late_s` late; returns a function that ends the subscription."""
 
     @abstractmethod
-    def serve(self, name: str, kind: ServiceType, handle: Callable[[Request], None]) -> None:
+    def serve(self, name: str, type_name: str, handle: Callable[[Request], None]) -> None:
         """Calls `handle` with each request for a service; it may answer later."""
 
     @abstractmethod
-    def client(self, name: str, kind: ServiceType) -> Client:
+    def client(self, name: str, type_name: str) -> Client:
         """Returns a client of a service."""
 
     def take(self, kind: MessageType, data: bytes, handle: Callable[[Any], Any], name: str) -> None:
@@ -147,7 +149,7 @@ class Node(ABC):
         """Decodes a message of just this length; counts it and returns None if it is malformed."""
         with suppress(MalformedError):
             if len(data) <= MOST_BYTES:
-                return kind.decode(data)
+                return kind.decode(data, self.padding)
         self.dropped += 1
         return None
 
@@ -163,7 +165,7 @@ class Node(ABC):
 
     def answer(self, name: str, type_name: str, answer: Callable[[Any], Any]) -> None:
         """Serves a service by a function from a request to its response, or to a mapping of its fields."""
-        self.serve(name, ros_types().service(type_name), lambda request: request.reply(answer(request.message)))
+        self.serve(name, type_name, lambda request: request.reply(answer(request.message)))
 
     def later(self, pool: Executor, handle: Callable[[Any], Any]) -> Callable[[Any], None]:
         """Returns a handler that lets a pool handle what comes, because it may take long, until the pool is closed."""

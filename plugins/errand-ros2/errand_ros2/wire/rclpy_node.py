@@ -26,7 +26,7 @@ from rclpy.utilities import get_rmw_implementation_identifier
 
 from errand_ros2.packages import PACKAGES
 from errand_ros2.wire.node import Client, Delays, Node, Place, Publisher, Request, Session, taken_by_others
-from errand_ros2.wire.types import USUAL, Qos, ServiceType, ros_types
+from errand_ros2.wire.types import USUAL, Qos, ros_types
 from skills.inputs.errors import InputError
 
 _LOG: Final = logging.getLogger(__name__)
@@ -213,9 +213,11 @@ class RclpyClient(Client):
 class RclpyNode(Node):
     """Node of rclpy."""
 
+    padding = 3  # DDS fills messages up to whole words of four bytes
+
     def __init__(self, session: RclpySession, name: str, namespace: str) -> None:
         super().__init__(namespace)
-        self.session, self._name, self._served = session, name, set[str]()
+        self.session, self._name = session, name
         self.inner = rclpy.create_node(name, namespace=self.namespace, context=session.context, enable_rosout=False)
         self.group = ReentrantCallbackGroup()  # else a request that is answered later would hold up all others
         session.nodes.append(self.inner)
@@ -266,12 +268,11 @@ class RclpyNode(Node):
         end, executor = partial(self.inner.destroy_subscription, subscription), self.session.executor
         return lambda: executor.create_task(end) and None  # in its thread, which may be reading the subscription
 
-    def serve(self, name: str, kind: ServiceType, handle: Callable[[Request], None]) -> None:
+    def serve(self, name: str, type_name: str, handle: Callable[[Request], None]) -> None:
         """Calls `handle` with each request for a service; it may answer later."""
         name, executor = self.absolute(name), self.session.executor
-        if name in self._served or (service := self.session.interface(kind.name, name)) is None:
-            return  # an installed ROS 2 has one form of each type
-        self._served.add(name)
+        if (service := self.session.interface(type_name, name)) is None:
+            return
 
         async def asked(request: Any, _: Any) -> Any:
             answered = Future[Any](executor=executor)
@@ -285,10 +286,10 @@ class RclpyNode(Node):
 
         self.inner.create_service(service, name, asked, callback_group=self.group)
 
-    def client(self, name: str, kind: ServiceType) -> Client:
+    def client(self, name: str, type_name: str) -> Client:
         """Returns a client of a service."""
         name = self.absolute(name)
-        service = self.session.interface(kind.name, name)
+        service = self.session.interface(type_name, name)
         return _Nobody() if service is None else RclpyClient(self, name, service)
 
 

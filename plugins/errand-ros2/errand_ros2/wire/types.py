@@ -59,15 +59,11 @@ class NodeKey:
     namespace: str
     name: str
 
-    def token(self, number: int | None = None, kind: str = NODE, *of_type: str) -> str:
-        """Returns the liveliness token of the node, or of one of its entities."""
-        number = self.number if number is None else number
-        head = (ADMIN, str(self.domain), self.session, str(self.number), str(number), kind)
-        return "/".join((*head, "%", self.namespace.replace("/", "%"), self.name, *of_type))
-
-    def entity_token(self, kind: str, number: int, name: str, type_key: str, qos: Qos) -> str:
-        """Returns the liveliness token of one of the node's publishers, subscriptions, services or clients."""
-        return self.token(number, kind, name.replace("/", "%"), type_key, qos.text())
+    def token(self, *of_type: str, kind: str = NODE, number: int | None = None) -> str:
+        """Returns the liveliness token of the node, or of one of its entities: with its name, type and quality."""
+        numbers = (self.domain, self.session, self.number, self.number if number is None else number)
+        parts = (ADMIN, *map(str, numbers), kind, "%", self.namespace, self.name, *of_type[:1])
+        return "/".join((*(part.replace("/", "%") for part in parts), *of_type[1:]))
 
     def data_key(self, name: str, type_key: str) -> str:
         """Returns the key expression of a topic or service; `type_key` is DDS_NAME/HASH of its type."""
@@ -98,14 +94,8 @@ def gid_of(token: str) -> bytes:
     return hashlib.blake2b(token.encode(), digest_size=_GID_BYTES).digest()
 
 
-def dds_name(ros_name: str) -> str:
-    """Returns the name in DDS of a type such as `std_msgs/msg/String`."""
-    package, kind, name = ros_name.split("/")
-    return f"{package}::{kind}::dds_::{name}_"
-
-
 def ros_name(type_key: str) -> str:
-    """Returns the name of the type that a key begins with: `dds_name` reversed."""
+    """Returns the name of the type, such as `std_msgs/msg/String`, whose name in DDS a key begins with."""
     return type_key.partition("/")[0].replace("::dds_", "").replace("::", "/").rstrip("_")
 
 
@@ -133,33 +123,25 @@ class MessageType:
         message = self.types.make(self.name, **message) if isinstance(message, Mapping) else message
         return bytes(self.types.store.serialize_cdr(message, self.name))
 
-    def decode(self, data: bytes) -> Any:
-        """Reads a message. Raises MalformedError when the bytes are no message of this type."""
+    def decode(self, data: bytes, padding: int = 0) -> Any:
+        """Reads a message, with so many bytes behind it. Raises MalformedError for bytes that are none of this type."""
+        store = self.types.store
         try:
-            return self.types.store.deserialize_cdr(data, self.name)
+            message = store.deserialize_cdr(data, self.name)
+            if len(data) > 4 + store.get_msgdef(self.name).getsize_cdr(0, message, store) + padding:
+                raise ValueError("it is too long")
         except Exception as error:  # generated code: struct.error, IndexError, UnicodeDecodeError and others
             raise MalformedError(f"{len(data)} bytes are no {self.name} ({type(error).__name__})") from error
+        return message
 
 
 @dataclass(frozen=True)
 class ServiceType:
     """Service type: its key, and the types of its request and response."""
 
-    name: str
     key: str
     request: MessageType
     response: MessageType
-
-
-class ActionType:
-    """Action type: the services and messages of which `rosidl` makes it. Raises KeyError when it is unknown."""
-
-    def __init__(self, types: Types, name: str) -> None:
-        self.name = name
-        self.send_goal, self.get_result = (types.service(f"{name}_{part}") for part in ("SendGoal", "GetResult"))
-        self.cancel_goal = types.service("action_msgs/srv/CancelGoal")
-        self.feedback_message = types.message(f"{name}_FeedbackMessage")
-        self.status = types.message("action_msgs/msg/GoalStatusArray")
 
 
 class Types:
@@ -173,12 +155,12 @@ class Types:
 
     def message(self, name: str) -> MessageType:
         """Returns a message type. Raises KeyError when it is unknown."""
-        return MessageType(name, self._key(name), self)
+        package, kind, base = name.split("/")
+        return MessageType(name, f"{package}::{kind}::dds_::{base}_/{self.store.hash_rihs01(name)}", self)
 
     def service(self, name: str) -> ServiceType:
         """Returns a service type. Raises KeyError when it is unknown."""
-        request, response = (self.message(f"{name}_{part}") for part in ("Request", "Response"))
-        return ServiceType(name, self._key(name), request, response)
+        return ServiceType(self.message(name).key, self.message(f"{name}_Request"), self.message(f"{name}_Response"))
 
     def make(self, name: str, /, **values: Any) -> Any:
         """Returns a message; mappings become messages, and what is left out is zero or empty.
@@ -203,9 +185,6 @@ class Types:
             return [self._value(of, each) for each in ([None] * length if given is None else given)]
         dtype = of[1][0].replace("byte", "uint8")
         return np.zeros(length, dtype) if given is None else np.asarray(given, dtype)
-
-    def _key(self, name: str) -> str:
-        return f"{dds_name(name)}/{self.store.hash_rihs01(name)}"
 
     def _register(self, file: Path) -> None:
         name = f"{file.parts[-3]}/{file.parts[-2]}/{file.stem}"
@@ -250,11 +229,10 @@ def ros_types() -> Types:
     return Types()
 
 
-def older_services(service: ServiceType) -> list[ServiceType]:
-    """Returns the form that a service has in distributions before Kilted, if it is another."""
-    types = older_types()
-    older = [types.service(service.name)] if f"{service.name}_Request" in types.store.types else []
-    return [each for each in older if each.key != service.key]
+def service_forms(name: str) -> list[ServiceType]:
+    """Returns the forms of a service: that of Kilted, and that of distributions before, if it is another."""
+    forms = [types.service(name) for types in (ros_types(), older_types()) if f"{name}_Request" in types.store.types]
+    return [*{each.key: each for each in forms}.values()]
 
 
 @cache

@@ -147,7 +147,7 @@ class ZenohNode(Node):
 
     def declare(self, kind: str, name: str, type_key: str, qos: Qos) -> bytes:
         """Declares an entity of the node; returns its identity."""
-        token = self.key.entity_token(kind, next(self.session.numbers), name, type_key, qos)
+        token = self.key.token(name, type_key, qos.text(), kind=kind, number=next(self.session.numbers))
         self._declared.append(self.session.liveliness.declare_token(token))
         return types.gid_of(token)
 
@@ -201,9 +201,12 @@ class ZenohNode(Node):
         key = f"{types.ADMIN}/{self.key.domain}/*/*/*/{types.PUBLISHER}/*/*/*/{name.replace('/', '%')}/**"
         self._declared.append(self.session.liveliness.declare_subscriber(key, found, history=True))
 
-    def serve(self, name: str, kind: ServiceType, handle: Callable[[Request], None]) -> None:
-        """Calls `handle` with each request for a service; it may answer later."""
-        name = self.absolute(name)
+    def serve(self, name: str, type_name: str, handle: Callable[[Request], None]) -> None:
+        """Calls `handle` with each request for a service, in any of its forms; it may answer later."""
+        for kind in types.service_forms(type_name):
+            self._serve(self.absolute(name), kind, handle)
+
+    def _serve(self, name: str, kind: ServiceType, handle: Callable[[Request], None]) -> None:
         key = self.key.data_key(name, kind.key)
         self.declare(types.SERVICE, name, kind.key, USUAL)
 
@@ -220,9 +223,9 @@ class ZenohNode(Node):
 
         self._declared.append(self.session.inner.declare_queryable(key, asked, complete=True))
 
-    def client(self, name: str, kind: ServiceType) -> ZenohClient:
+    def client(self, name: str, type_name: str) -> ZenohClient:
         """Returns a client of a service."""
-        return ZenohClient(self, self.absolute(name), kind)
+        return ZenohClient(self, self.absolute(name), ros_types().service(type_name))
 
 
 def _reply(kind: MessageType, query: zenoh.Query, key: str, asked: Attachment, response: Any) -> None:

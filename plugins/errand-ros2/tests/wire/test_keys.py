@@ -2,7 +2,7 @@
 
 import pytest
 
-from errand_ros2.wire.types import SUBSCRIPTION, Attachment, NodeKey, Qos, dds_name, gid_of, topic_name
+from errand_ros2.wire.types import SUBSCRIPTION, Attachment, NodeKey, Qos, gid_of, ros_name, ros_types, topic_name
 from skills.inputs.errors import InputError
 
 CHATTER = "std_msgs::msg::dds_::String_/RIHS01_df66"
@@ -14,7 +14,7 @@ def test_a_node_has_the_token_of_the_design_page():
 
 
 def test_a_subscription_has_the_token_of_the_design_page():
-    token = NODE.entity_token(SUBSCRIPTION, 10, "/chatter", CHATTER, Qos())
+    token = NODE.token("/chatter", CHATTER, Qos().text(), kind=SUBSCRIPTION, number=10)
     head = "@ros2_lv/2/aac3178e146ba6f1fc6e6a4085e77f21/0/10/MS/%/%/listener"
     assert token == f"{head}/%chatter/{CHATTER}/::,10:,:,:,,"
 
@@ -56,7 +56,8 @@ def test_entities_have_different_identities():
 
 
 def test_a_type_has_its_name_in_dds():
-    assert dds_name("geometry_msgs/msg/Twist") == "geometry_msgs::msg::dds_::Twist_"
+    key = ros_types().message("geometry_msgs/msg/Twist").key
+    assert key.startswith("geometry_msgs::msg::dds_::Twist_/RIHS01_") and ros_name(key) == "geometry_msgs/msg/Twist"
 
 
 @pytest.mark.parametrize("name", ["", "/", "1a", "a//b", "a b", "a/*", "a%", "ä"])

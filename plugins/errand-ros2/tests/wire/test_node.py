@@ -6,7 +6,7 @@ import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from importlib.util import find_spec
 from types import SimpleNamespace
@@ -125,18 +125,18 @@ def test_a_late_subscription_gets_the_last_message_of_a_latched_topic(one, two):
 
 def test_a_service_answers(one, two):
     one.node.answer("reset", TRIGGER, lambda request: {"success": True, "message": "done"})
-    assert two.client("/alice/reset", ros_types().service(TRIGGER)).call({}, limit_s=5.0).message == "done"
+    assert two.client("/alice/reset", TRIGGER).call({}, limit_s=5.0).message == "done"
 
 
 def test_a_service_that_nobody_offers_gives_no_answer(two):
-    assert two.client("/none", ros_types().service(TRIGGER)).call({}, limit_s=0.2) is None
+    assert two.client("/none", TRIGGER).call({}, limit_s=0.2) is None
 
 
 def test_a_node_tells_its_parameters(one, two):
-    asked = ros_types().service("rcl_interfaces/srv/GetParameters")
+    asked = "rcl_interfaces/srv/GetParameters"
     told = two.client("/alice/errand/get_parameters", asked).call({"names": ["use_sim_time"]}, limit_s=5.0)
     assert [(each.type, each.bool_value) for each in told.values] == [(1, False)]
-    every = ros_types().service("rcl_interfaces/srv/ListParameters")
+    every = "rcl_interfaces/srv/ListParameters"
     assert "use_sim_time" in two.client("/alice/errand/list_parameters", every).call({}, limit_s=5.0).result.names
 
 
@@ -225,12 +225,21 @@ def test_random_bytes_from_rclpy_are_dropped_and_counted(capfd):
 
 
 # A header alone, with the padding that it tells: Fast CDR would read memory behind it; a velocity, shorter or longer.
+@pytest.mark.parametrize("padding", [0, 3])
 @pytest.mark.parametrize("data", [*(bytes([0, 1, 0, padding]) for padding in range(4)), b"", bytes(51), bytes(56)])
-def test_bytes_of_another_length_are_no_velocity(data):
+def test_bytes_of_another_length_are_no_velocity(data, padding):
     twist = ros_types().message("geometry_msgs/msg/Twist")
-    assert twist.decode(bytes(52)) == twist.decode(bytes(55))
+    assert twist.decode(bytes(52)) == twist.decode(bytes(52 + padding), padding)
     with pytest.raises(MalformedError):
-        twist.decode(data)
+        twist.decode(data, padding)
+
+
+@pytest.mark.parametrize("length", [5, 6, 8])
+def test_only_a_wire_that_fills_messages_up_allows_bytes_behind_them(length):
+    flag = ros_types().message("std_msgs/msg/Bool")
+    assert flag.decode(bytes(length), 3).data is False
+    with nullcontext() if length == 5 else pytest.raises(MalformedError, match=f"{length} bytes are no std_msgs"):
+        flag.decode(bytes(length))
 
 
 def test_malformed_requests_get_no_answer_and_do_no_harm(router, other):

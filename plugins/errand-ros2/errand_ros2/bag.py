@@ -33,47 +33,38 @@ _QOS: Final = Qos(
     *(QosHistory.KEEP_LAST, 10, QosReliability.RELIABLE, QosDurability.VOLATILE, _FOREVER, _FOREVER),
     *(QosLiveliness.AUTOMATIC, _FOREVER, False),
 )
+_LATE: Final = _QOS._replace(durability=QosDurability.TRANSIENT_LOCAL)  # late listeners get the last message
 _HERE: Final = {"position": {}, "orientation": {"w": 1.0}}
 
 Message = tuple[str, str, Fields]  # topic, type and fields
 
 
-def write_bag(events: Iterable[Event], folder: Path, name: str) -> int:
-    """Writes the events as a ROS 2 bag with `metadata.yaml` into an existing folder; returns the number of messages."""
-    bag = folder / name
-    count = _write(events, bag)
-    for file in bag.iterdir():
-        file.rename(folder / file.name)
-    bag.rmdir()
-    return count
+def write_bag(events: Iterable[Event], out: Path) -> int:
+    """Writes the events as a ROS 2 bag, a new folder or one file `*.mcap`; returns the number of messages.
 
-
-def write_bag_file(events: Iterable[Event], path: Path) -> int:
-    """Writes the events as one MCAP file of ROS 2; returns the number of messages. Raises InputError."""
-    with writing(path), TemporaryDirectory(dir=path.parent, prefix=f".{path.name}-") as folder:
-        count = write_bag(events, Path(folder), path.stem)
-        (Path(folder) / f"{path.stem}.mcap").replace(path)
-    return count
-
-
-def _write(events: Iterable[Event], bag: Path) -> int:
-    events, types = tuple(events), ros_types()
+    Raises InputError when it cannot be written, as where a folder is not empty.
+    """
+    events, types, is_file = tuple(events), ros_types(), out.suffix == ".mcap"
     starts_s = (each.data["start_s"] for each in events if each.topic == "wall" and "start_s" in each.data)
-    converter = _Converter(next(starts_s, 0.0))
-    writer = Writer(bag, version=_VERSION, storage_plugin=StoragePlugin.MCAP)
-    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
-    with writer:
-        connections: dict[str, Any] = {}
-        for event in events:
-            time_ns = round((converter.start_s + event.stamp_s) * 1e9)
-            for topic, kind, fields in converter.messages(event):
-                if topic not in connections:
-                    late = topic in ("/map", TF_STATIC)  # late listeners get the last message
-                    qos = _QOS._replace(durability=QosDurability.TRANSIENT_LOCAL) if late else _QOS
-                    added = writer.add_connection(topic, kind, typestore=types.store, offered_qos_profiles=[qos])
-                    connections[topic] = added, types.message(kind)
-                connection, message_type = connections[topic]
-                writer.write(connection, time_ns, message_type.encode(fields))
+    converter, connections = _Converter(next(starts_s, 0.0)), dict[str, Any]()
+    with writing(out, "name another --out"):
+        if not is_file:
+            out.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(dir=out.parent, prefix=f".{out.name}-") as folder:
+            bag = Path(folder) / out.resolve().stem
+            writer = Writer(bag, version=_VERSION, storage_plugin=StoragePlugin.MCAP)
+            writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+            with writer:
+                for event in events:
+                    time_ns = round((converter.start_s + event.stamp_s) * 1e9)
+                    for topic, kind, fields in converter.messages(event):
+                        if topic not in connections:
+                            qos = [_LATE if topic in ("/map", TF_STATIC) else _QOS]
+                            added = writer.add_connection(topic, kind, typestore=types.store, offered_qos_profiles=qos)
+                            connections[topic] = added, types.message(kind)
+                        connection, message_type = connections[topic]
+                        writer.write(connection, time_ns, message_type.encode(fields))
+            (bag / f"{bag.name}.mcap" if is_file else bag).replace(out)
     return sum(writer.counts.values())
 
 

@@ -11,7 +11,6 @@ import typer
 
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START, start_pose
-from executive.cli.output import new_folder
 from executive.record.history import read_history
 from skills.inputs.outside import writing
 from skills.quantities import Delay, Seed
@@ -31,16 +30,11 @@ def bag(
     robot: Annotated[str | None, typer.Option(metavar="NAME", help="Only this one of several robots.")] = None,
 ) -> None:
     """Writes a ROS 2 bag: map, transforms, scans, joint states, poses, paths and pictures."""
-    from errand_ros2.bag import write_bag, write_bag_file
+    from errand_ros2.bag import write_bag
 
     history = read_history(file)
     history = history if robot is None else history.of_robot(robot)
-    if out.suffix == ".mcap":
-        count = write_bag_file(history.events, out)
-    else:
-        with new_folder(out) as folder:
-            count = write_bag(history.events, folder, out.resolve().name)
-    typer.echo(f"{count} messages in {out}", err=True)
+    typer.echo(f"{write_bag(history.events, out)} messages in {out}", err=True)
 
 
 @ros2.command()
@@ -72,8 +66,7 @@ def serve_ros2(
     """Serves a simulated robot in ROS 2, without navigation, until Ctrl-C."""
     from errand_ros2.adapter.description import capabilities_of
     from errand_ros2.server import RobotServer
-    from errand_ros2.wire.node import Place
-    from errand_ros2.wire.session import open_session
+    from errand_ros2.wire.node import Place, open_session
     from errand_ros2.wire.types import topic_name
     from executive.app.prepare.placed_robots import only_robot, refuse_blocked
     from executive.app.prepare.worlds import open_world

@@ -10,7 +10,7 @@ import threading
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -111,7 +111,8 @@ class Goals:
             raise InputError(f"{self._name} has no mission any more", hint="send goals while its mission lasts")
         name = f"ros2 goal {next(self._numbers)}"
         asked = None if goal is None else goal.message
-        mission = self._asked(name, asked) if source == _MISSION else self._mission_of(name, *map(_drive_to, poses))
+        drives = [{"skill": "navigate", "with": {"goal": asdict(pose)}} for pose in poses]
+        mission = self._asked(name, asked) if source == _MISSION else self._mission_of(name, *drives)
         tree, stop = self._compiled(mission), self._compiled(self._mission_of(f"{name} cancelled", _STOP))
         with self._lock:
             before = next(reversed(self._pursued), None)
@@ -191,11 +192,6 @@ class Goals:
         if each.source != _MISSION:
             result = {"error_code": _FAILED if failed else 0, "error_msg": f"{cause}: {words}" if failed else ""}
         self._actions[each.source].end(each.goal, status, **result)
-
-
-def _drive_to(pose: Pose2D) -> Mapping[str, Any]:
-    goal = {"x_m": pose.x_m, "y_m": pose.y_m, "yaw_rad": pose.yaw_rad}
-    return {"skill": "navigate", "with": {"goal": goal}}
 
 
 def _feedback(each: _Pursued, context: SkillContext, now_s: float) -> Mapping[str, Any]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
+from pathlib import Path as File
 from typing import Any, Final
 
 import numpy as np
@@ -14,13 +15,13 @@ import numpy as np
 from errand_ros2.messages import MAP_FRAME, Fields, pose_stamped
 from errand_ros2.readings import planar_pose
 from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError, SentGoal
-from errand_ros2.wire.node import Place
-from errand_ros2.wire.session import open_session
+from errand_ros2.wire.node import Place, open_session
 from errand_ros2.wire.types import ros_types
 from skills.api import Cause, FreeSpace, PlanningError
 from skills.footprint import Footprint, footprint_clearance_m, pose_array
 from skills.geometry import compose, inverse
 from skills.inputs.errors import InputError
+from skills.inputs.yaml_source import read_yaml
 from skills.navigate.follower import FollowerOptions, PathFollower
 from skills.path import Drive, Path, densify, progress_m
 from skills.quantities import Angle, Coordinate, Duration, Length, Margin
@@ -30,43 +31,31 @@ from skills.routine import SkillFailure
 _PLAN: Final = "nav2_msgs/action/ComputePathToPose"
 _TO_POSE, _THROUGH = (f"nav2_msgs/action/{each}" for each in ("NavigateToPose", "NavigateThroughPoses"))
 _STEP_M: Final = 0.05
-_ERRORS: Final = (
-    (Cause.PRECONDITION, "one of its servers does not take the request", (1, 2)),
-    (
-        Cause.PRECONDITION,
-        "it lacks the planner, controller or graph asked for",
-        (101, 201, 301, 402, 407, 501),
-    ),
-    (Cause.PRECONDITION, "it cannot load its behaviour tree", (9001, 9101)),
-    (Cause.PRECONDITION, "the robot stands outside of its map", (203, 303)),
-    (Cause.PLANNING, "the robot stands in an obstacle", (205, 305)),
-    (Cause.PLANNING, "the goal is outside of its map", (204, 304)),
-    (Cause.PLANNING, "the goal lies in an obstacle", (206, 306)),
-    (Cause.PLANNING, "no path leads to the goal", (208, 308, 403, 405)),
-    (Cause.PLANNING, "the planner timed out", (207, 307, 404)),
-    (Cause.PLANNING, "the smoother timed out", (502,)),
-    (Cause.PLANNING, "the path cannot be used", (103, 309, 503, 504, 505, 713, 724)),
-    (Cause.EXECUTION, "the way is blocked", (104, 106, 703, 714, 723)),
-    (Cause.EXECUTION, "the robot makes no progress", (105,)),
-    (Cause.EXECUTION, "the controller timed out", (107, 108)),
-    (Cause.EXECUTION, "a recovery timed out", (701, 711, 721, 731, 741)),
-    (Cause.EXECUTION, "it timed out", (9003, 9103)),
-    (Cause.EXECUTION, "it lacks transforms from map to robot", (102, 202, 302, 401, 702, 712, 722, 732, 9002, 9102)),
-)
-"""Causes and words of the error codes in Nav2's results, of Jazzy to Lyrical; Humble has none."""
-_MEANINGS: Final = {code: (cause, words) for cause, words, codes in _ERRORS for code in codes}
+
+
+@cache
+def _meanings() -> Mapping[int, tuple[Cause, str]]:
+    """Returns causes and words of Nav2's error codes."""
+    table = read_yaml(File(__file__).with_name("nav2_errors.yaml")).data.items()
+    return {code: (Cause[cause], words) for cause, rows in table for words, codes in rows.items() for code in codes}
 
 
 def failure_of(result: Any) -> tuple[Cause, str]:
     """Returns the cause of a failure, and its words, by the error code and the message of a result."""
     code, said = getattr(result, "error_code", 0), getattr(result, "error_msg", "")
-    cause, words = _MEANINGS.get(code, (Cause.EXECUTION, "it does not say why" if not said else ""))
+    cause, words = _meanings().get(code, (Cause.EXECUTION, "it does not say why" if not said else ""))
     return cause, ", ".join(filter(None, [words, f"error {code}" if code else "", f"'{said[:200]}'" if said else ""]))
 
 
 def _in_map(map_pose: Sequence[float], pose: Pose2D) -> Fields:
     """Message of a pose in the robot's frame `map`."""
     return pose_stamped(0.0, MAP_FRAME, compose(inverse(Pose2D(*map_pose)), pose).transform())
+
+
+def _path(rows: FloatArray, costmap: FreeSpace, footprint: Footprint) -> Path:
+    rows[:, 2] = np.unwrap(rows[:, 2])
+    poses = densify(rows, _STEP_M)
+    return Path(poses, footprint_clearance_m(costmap, footprint, poses))
 
 
 @dataclass(frozen=True)
@@ -89,7 +78,6 @@ class Nav2:
         self, costmap: FreeSpace, footprint: Footprint, start: Pose2D, goal: Pose2D, **_: Any
     ) -> Callable[[], Path]:
         """Returns a function that asks Nav2 and raises PlanningError; Nav2 does not know zones and speed limits."""
-
         return partial(self._plan, costmap, footprint, start, goal)
 
     def _plan(self, costmap: FreeSpace, footprint: Footprint, start: Pose2D, goal: Pose2D) -> Path:
@@ -113,10 +101,7 @@ class Nav2:
         off_m = np.hypot(found[-1].x_m - goal.x_m, found[-1].y_m - goal.y_m) if found else np.inf
         if off_m > self.tolerance_m:
             raise PlanningError(f"Nav2's path ends {off_m:.2f} m from the goal")
-        rows = pose_array([start, *found, goal])
-        rows[:, 2] = np.unwrap(rows[:, 2])
-        poses = densify(rows, _STEP_M)
-        return Path(poses, footprint_clearance_m(costmap, footprint, poses))
+        return _path(pose_array([start, *found, goal]), costmap, footprint)
 
 
 @dataclass(frozen=True)
@@ -258,8 +243,5 @@ class Nav2Follower(PathFollower):
         if self._footprint.base_kind is BaseKind.DIFFERENTIAL and off_m > _STEP_M:
             heading = math.atan2(*(rows[1] - rows[0])[1::-1])
             rows = np.insert(rows, 1, [[*rows[0, :2], heading], [*rows[1, :2], heading]], axis=0)
-        rows[:, 2] = np.unwrap(rows[:, 2])
-        poses = densify(rows, _STEP_M)
-        rest = Path(poses, footprint_clearance_m(costmap, self._footprint, poses))
-        super().__init__(rest, self._footprint, self._by)
+        super().__init__(_path(rows, costmap, self._footprint), self._footprint, self._by)
         self._arrived = True

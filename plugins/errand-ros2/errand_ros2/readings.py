@@ -16,7 +16,7 @@ from errand_ros2.messages import MAP_FRAME
 from errand_ros2.wire.node import Node
 from skills.grid_map import GridMap
 from skills.inputs.errors import InputError
-from skills.robot import Capabilities, Imu, Intrinsics, Joints, Odometry, Pose2D, Scan
+from skills.robot import Battery, Capabilities, Imu, Intrinsics, Joints, Odometry, Pose2D, Scan
 
 FRAMES: Final = frozenset({MAP_FRAME, "world"})  # names of the map's frame
 TOPIC: Final = "cmd_vel"
@@ -160,6 +160,11 @@ def imu(message: Any, stamp_s: float) -> Imu:
     """Returns sensor_msgs/Imu, in the axes of its frame."""
     w, a = message.angular_velocity, message.linear_acceleration
     return Imu(stamp_s, (w.x, w.y, w.z), (a.x, a.y, a.z))
+
+
+def battery(message: Any, stamp_s: float) -> Battery | None:
+    """Returns sensor_msgs/BatteryState; None where it does not tell the charge."""
+    return Battery(stamp_s, float(message.percentage)) if 0.0 <= message.percentage <= 1.0 else None
 
 
 def cloud_points(message: Any) -> NDArray[np.float64]:

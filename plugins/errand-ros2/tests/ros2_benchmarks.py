@@ -7,7 +7,8 @@ With the Python of `make ros`, two processes and a client with rclpy alone:
 rclpy: COUNT goals of navigate_to_pose of a run, each cancelled under way, and as many that are reached.
 bytes: COUNT random bytes to each input of a run and of a served robot: what moves, and what is said.
 base: COUNT missions with --robot ros2://alice on the base of rclpy_base.py, judged by where it stands at the end.
-fetch: fetch_drink on a served robot with the seeds 1 to COUNT, or from FIRST on, by its own claim.
+fetch: fetch_drink on a served robot with the seeds 1 to COUNT, or from FIRST on; the referee of the plant, which is in
+    the robot's process, judges the goal conditions, which the run's process sends over a pipe.
 """
 
 import json
@@ -21,24 +22,28 @@ import tempfile
 import threading
 import time
 import uuid
-from contextlib import suppress
+from contextlib import closing, suppress
 from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
 
 from errand_ros2.bridge import Bridge
 from errand_ros2.server import RobotServer
-from errand_ros2.wire.node import Place
-from errand_ros2.wire.session import open_session
+from errand_ros2.wire.node import Place, open_session
 from errand_ros2.wire.types import Attachment, ros_types
 from executive import Request
 from executive.app.prepare.from_request import prepare
 from executive.app.prepare.placed_robots import only_robot
 from executive.app.prepare.worlds import open_world
+from executive.app.runs.goal_conditions import verdict_of
 from executive.app.runs.one_run import run_request
-from executive.app.runs.simulated import simulate
+from executive.app.runs.real_robot import real_runner
+from executive.app.runs.simulated import compile_first, simulate
 from executive.run.control import Control
+from skills.robot import Pose2D
+from tests.benchmarks.served_missions import MISSIONS, Witness
 
 HEARD = {"/alice/scan": "sensor_msgs/msg/LaserScan", "/tf": "tf2_msgs/msg/TFMessage"}
 HEARD |= {"/alice/frontleft/image": "sensor_msgs/msg/Image", "/clock": "rosgraph_msgs/msg/Clock"}
@@ -193,7 +198,7 @@ def cancel(count):
 SENDER = """
 import sys, time
 from errand_ros2.wire.node import Place
-from errand_ros2.wire.session import open_session
+from errand_ros2.wire.node import open_session
 from errand_ros2.wire.types import ros_types
 
 with open_session(Place(port=int(sys.argv[1]))) as session:
@@ -344,22 +349,65 @@ def base(count):
         sys.stdout.write(f"{room}: exit code {ended.returncode}, {off_m:.2f} m from where a robot stands there\n")
 
 
-def fetch(count, first=1):
-    from rclpy_client import errand
+def serve_plant(seed, domain, pipe):
+    """Serves a robot in the flat, in a process of its own; answers through a pipe what is asked of the plant."""
+    world, ended = open_world("flat"), threading.Event()
+    placed = only_robot("Alice", world, seed=seed, start=Pose2D(*map(float, START)))
+    compile_first()
+    simulation = simulate(world, {"Alice": placed}, seed=seed, record=False)
+    known = {"judge": simulation.referee.judge, "touch": simulation.referee.expect_touch}
+    known |= {"picture": simulation.record_picture}
+    with open_session(Place(domain, by_rclpy=True)) as session:
+        server = RobotServer(session, simulation.robots["Alice"], simulation.clock)
 
-    place, domain = ("--world", "flat", "--start", *START), DOMAIN + 20
-    for seed in map(str, range(first, count + 1)):
-        served = errand("serve-ros2", f"rclpy:{domain}", *place, "--seed", seed, ready="ROS 2: /alice")
-        with tempfile.TemporaryDirectory() as folder, served as said:
-            run = ["run", "fetch_drink", *place, "--seed", seed, "--no-record", "--quiet", "--out", folder]
-            words = [sys.executable, "-m", "executive.cli", *run, "--robot", f"ros2://alice?network=rclpy:{domain}"]
-            begun_s = time.monotonic()
-            ended = subprocess.run(words, capture_output=True, text=True, timeout=900, check=False)
-        spent_s, lines = time.monotonic() - begun_s, (ended.stderr + ended.stdout).strip().splitlines()
-        wrong = sum("Traceback" in line for line in (*lines, *said))
-        sys.stdout.write(
-            f"seed {seed}: exit code {ended.returncode}, {spent_s:.0f} s, {wrong} tracebacks: {lines[-1]}\n"
+        def answer():
+            with suppress(EOFError):
+                while True:
+                    what, *given = pipe.recv()
+                    pipe.send(server.work.submit(known[what], *given).result())
+            ended.set()
+
+        threading.Thread(target=answer, daemon=True).start()
+        pipe.send("ready")
+        server.run(ended)
+
+
+class Asked:
+    """The plant of another process: what the witness of a run tells it, and its referee."""
+
+    def __init__(self, pipe):
+        self._pipe, self._lock, self.referee = pipe, threading.Lock(), self
+        self.judge, self.expect_touch, self.record_picture = (
+            partial(self.ask, what) for what in ("judge", "touch", "picture")
         )
+
+    def ask(self, *what):
+        with self._lock:
+            self._pipe.send(what)
+            return self._pipe.recv()
+
+
+def fetch(count, first=1):
+    domain, context = DOMAIN + 20, get_context("spawn")
+    for seed in range(first, count + 1):
+        ours, theirs = context.Pipe()
+        served = context.Process(target=serve_plant, args=(seed, domain, theirs))
+        served.start()
+        theirs.close()
+        with tempfile.TemporaryDirectory() as folder, closing(ours):
+            ours.recv()
+            asked = {"file": MISSIONS / "fetch_drink.yaml", "world": "flat", "start": Pose2D(*map(float, START))}
+            prepared = prepare(Request(**asked, seed=seed, out=Path(folder) / "out", record=False))
+            begun_s, plant = time.monotonic(), Asked(ours)
+            with real_runner(prepared, f"ros2://alice?network=rclpy:{domain}") as run:
+                run.keywords["backend"].judge = lambda tree, result, plant=plant, **more: verdict_of(
+                    tree, result, plant.judge, **more
+                )
+                report = run(prepared, visitors=[Witness(plant)], control=Control(attended=False, pace=None)).report
+        served.join(20.0)
+        seen, spent_s = report.seen, time.monotonic() - begun_s
+        sys.stdout.write(f"seed {seed}: {report.outcome}, judged {seen.success}, {seen.collisions} collisions, ")
+        sys.stdout.write(f"{seen.drops} drops, {report.sim_time_s:.0f} s in {spent_s:.0f} s; {seen.why}\n")
         sys.stdout.flush()
 
 

@@ -12,7 +12,7 @@ from mcap_ros2.reader import read_ros2_messages
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
-from errand_ros2.bag import GRID, VIEWER_COPIES, write_bag, write_bag_file
+from errand_ros2.bag import GRID, VIEWER_COPIES, write_bag
 from executive.record.history import read_history
 from executive.words.schemas import DERIVED
 from skills.inputs.errors import InputError
@@ -27,8 +27,8 @@ def events(log_of_session):
 def bag(tmp_path_factory, events):
     """Folder of the bag."""
     folder = tmp_path_factory.mktemp("bag")
-    write_bag(events, folder, "bag")
-    return folder
+    write_bag(events, folder / "bag")
+    return folder / "bag"
 
 
 @pytest.fixture(scope="module")
@@ -135,11 +135,11 @@ def test_rosbags_reads_the_folder_as_a_bag(bag, decoded):
 
 
 def test_a_bag_may_be_one_file(tmp_path, events, decoded):
-    count = write_bag_file(events, tmp_path / "one.mcap")
+    count = write_bag(events, tmp_path / "one.mcap")
     topics = [message.channel.topic for message in read_ros2_messages(str(tmp_path / "one.mcap"))]
     assert count == len(topics) == len(decoded)
 
 
 def test_a_bag_that_cannot_be_written_is_refused(tmp_path):
     with pytest.raises(InputError, match="cannot write"):
-        write_bag_file((), tmp_path / "absent" / "bag.mcap")
+        write_bag((), tmp_path / "absent" / "bag.mcap")

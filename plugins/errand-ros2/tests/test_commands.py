@@ -41,7 +41,7 @@ def test_the_bag_of_one_robot_leaves_the_others_out(log_file, tmp_path):
     [
         ("log.mcap --out bag --robot carl", "log.mcap: the log has no robot 'carl'; there are: Alice, Bob\n"),
         ("absent.mcap --out bag", "absent.mcap: there is no such file; name a log that exists\n"),
-        ("log.mcap --out full", "full: it exists already; name a new folder by --out\n"),
+        ("log.mcap --out full", "full: cannot write it (Directory not empty); name another --out\n"),
         ("log.mcap --out no/such/bag.mcap", "no/such/bag.mcap: cannot write it"),
     ],
 )

@@ -73,11 +73,10 @@ class ArmFile(Part):
     action: Topic
 
 
-class GripperFile(Part):
+class GripperFile(ArmFile):
     """Gripper: its action; `scale` from the opening to the action's position, which is a joint's and may fall as the
     gripper opens; topics of what it feels, if any."""
 
-    action: Topic
     scale: float = 1.0
     holding: Topic | None = None
     force: Topic | None = None

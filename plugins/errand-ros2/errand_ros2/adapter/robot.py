@@ -16,8 +16,9 @@ from errand_ros2.part_actions import GRIPPER, INVALID_GOAL, TRAJECTORY
 from errand_ros2.readings import within_limits
 from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError
 from errand_ros2.wire.node import Node
+from executive.words.schemas import pose_values
 from skills.command_table import CommandTable, LeaseManager, refusal_of
-from skills.robot import ArmTrajectory, BaseKind, CommandCause, CommandId, CommandState, CommandStatus, Lease
+from skills.robot import ArmTrajectory, BaseKind, CommandCause, CommandId, CommandState, Lease
 
 GONE_S, _CALL_S = 15.0, 0.5
 _LEAST_POINT_S, _HEAD_RAD_S = 0.2, 1.0
@@ -42,6 +43,7 @@ class Ros2Robot(SensedRobot):
         }
         self._commands, self._unsure = CommandTable[str](), dict[str, Any]()
         self._leases = LeaseManager(name)
+        self.command_status, self.acquire_lease = self._commands.status, self._leases.acquire
 
     def notes(self, address: str, endpoint: str) -> tuple[str, ...]:
         """Returns sentences for the report on what the robot does not tell."""
@@ -73,7 +75,7 @@ class Ros2Robot(SensedRobot):
         if not (low <= height_m <= high and least <= pitch_rad <= most):
             return self._commands.refuse(f"stand: {height_m:.2f} m, {pitch_rad:.2f} rad is out of range")
         X = RigidTransform(RotationMatrix.MakeYRotation(pitch_rad), [0.0, 0.0, height_m - can.standing_height_m])
-        self._posture.put(messages.pose(X))
+        self._posture.put(pose_values(X))
         return self._commands.begin(POSTURE, (height_m, pitch_rad), self._clock.now(), until_s)
 
     def sit(self, *_: Any, **__: Any) -> CommandId:
@@ -127,17 +129,9 @@ class Ros2Robot(SensedRobot):
                 self._halt(part, CommandState.STOPPED, "stopped by command", CommandCause.STOPPED)
         return self._commands.note(CommandState.DONE)
 
-    def command_status(self, command: CommandId) -> CommandStatus:
-        """Returns the last known status of a command. Raises KeyError for an unknown id."""
-        return self._commands.status(command)
-
     def lease_holder(self) -> Lease | None:
         """Valid lease within this program; ROS 2 has none."""
         return self._leases.current
-
-    def acquire_lease(self, holder: str) -> Lease:
-        """Takes the lease within this program. Raises LeaseError when another has it."""
-        return self._leases.acquire(holder)
 
     def take_lease(self, holder: str) -> Lease:
         """Takes the lease from its holder; the robot stops."""

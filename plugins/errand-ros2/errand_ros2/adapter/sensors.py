@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import cv2
 import numpy as np
@@ -58,19 +58,16 @@ class SensedRobot:
         self._joints: deque[Joints] = deque(maxlen=_KEPT)
         self._fixed: dict[str, tuple[str, RigidTransform]] = {}
         self._jumps, self.body_frame = 0, ""
-        self._scan: Scan | None = None
-        self._imu: Imu | None = None
-        self._place: OwnLocalisation | None = None
+        self._latest: dict[str, Any] = {}  # readings that come alone
         self._felt = Gripper(0.0, 0.0, 0.0, False)
-        self._battery: Battery | None = None
         node.subscribe(file.odometry.topic, "nav_msgs/msg/Odometry", self._hear_odometry)
         node.subscribe("/tf_static", "tf2_msgs/msg/TFMessage", self._hear_fixed, LATCHED)
         self._hear(file.joints, "sensor_msgs/msg/JointState", self._hear_joints)
-        self._hear(file.lidar.points, "sensor_msgs/msg/PointCloud2", self._hear_points)
-        self._hear(file.lidar.scan, "sensor_msgs/msg/LaserScan", self._hear_scan)
-        self._hear(file.imu, "sensor_msgs/msg/Imu", self._hear_imu)
-        self._hear(file.battery, "sensor_msgs/msg/BatteryState", self._hear_battery)
-        self._hear(file.pose, "geometry_msgs/msg/PoseWithCovarianceStamped", self._hear_pose)
+        self._hear(file.lidar.points, "sensor_msgs/msg/PointCloud2", partial(self._take, "scan", self._ringed_scan))
+        self._hear(file.lidar.scan, "sensor_msgs/msg/LaserScan", partial(self._take, "scan", self._flat_scan))
+        self._hear(file.imu, "sensor_msgs/msg/Imu", partial(self._take, "imu", readings.imu))
+        self._hear(file.battery, "sensor_msgs/msg/BatteryState", partial(self._take, "battery", readings.battery))
+        self._hear(file.pose, "geometry_msgs/msg/PoseWithCovarianceStamped", partial(self._take, "place", self._own))
         if (grip := file.gripper) is not None:
             self._hear(grip.holding, "std_msgs/msg/Bool", lambda told: self._feel(holding=bool(told.data)))
             self._hear(grip.force, "geometry_msgs/msg/WrenchStamped", self._hear_force)
@@ -95,15 +92,15 @@ class SensedRobot:
 
     def own_localisation(self) -> OwnLocalisation | None:
         """Latest pose by the robot's own localisation; None without one."""
-        return self._place
+        return cast(OwnLocalisation | None, self._latest.get("place"))
 
     def imu(self) -> Imu | None:
         """Latest inertial measurement; None without one."""
-        return self._imu
+        return cast(Imu | None, self._latest.get("imu"))
 
     def scan(self) -> Scan | None:
         """Latest LiDAR revolution; None before the first."""
-        return self._scan
+        return cast(Scan | None, self._latest.get("scan"))
 
     def gripper(self) -> Gripper:
         """Latest gripper state."""
@@ -115,7 +112,7 @@ class SensedRobot:
 
     def battery(self) -> Battery:
         """Latest battery state; full when no topic tells."""
-        return self._battery or Battery(self._clock.now(), 1.0)
+        return self._latest.get("battery") or Battery(self._clock.now(), 1.0)
 
     def faults(self) -> tuple[str, ...]:
         """Returns a fault while the robot is silent."""
@@ -134,7 +131,7 @@ class SensedRobot:
             return file.odometry.topic
         if left:
             return f"{file.joints} with {', '.join(left)}"
-        if self._scan is None:
+        if "scan" not in self._latest:
             frame = f" (or no /tf_static to {self._lidar_frame})" if self._X_BF(self._lidar_frame) is None else ""
             return f"{file.lidar.points or file.lidar.scan}{frame}"
         return ""
@@ -175,41 +172,32 @@ class SensedRobot:
             if moved is not None and len(self._fixed) < _KEPT:
                 self._fixed[each.child_frame_id.strip("/")] = (each.header.frame_id.strip("/"), moved)
 
-    def _hear_points(self, message: Any) -> None:
+    def _take(self, what: str, read: Callable[[Any, float], Any], message: Any) -> None:
+        """Reads a message with its stamp; what cannot be used, and what is older than the last, is dropped."""
+        found = newer(self._latest.get(what), readings.usable(read, message, self._stamp(message)))
+        self._latest |= {} if found is None else {what: found}
+
+    def _ringed_scan(self, message: Any, stamp_s: float) -> Scan | None:
         X_BF, X_BL = self._X_BF(message.header.frame_id.strip("/")), self._X_BF(self._lidar_frame)
-        stamp_s = self._stamp(message)
-        points_F, X_OB = readings.usable(readings.cloud_points, message), self._X_OB(stamp_s)
-        if points_F is None or X_BF is None or X_BL is None or X_OB is None:
-            return
+        points_F, X_OB, file = readings.cloud_points(message), self._X_OB(stamp_s), self._description.file.lidar
+        if X_BF is None or X_BL is None or X_OB is None:
+            return None
         points_L = (X_BL.inverse() @ X_BF @ points_F.T).T if len(points_F) else points_F
-        file = self._description.file.lidar
         elevations = np.radians(np.linspace(file.lowest, file.highest, file.rings))
-        read = scan_of_points(points_L, elevations, file.columns, stamp_s, X_BL, X_OB)
-        self._scan = newer(self._scan, read)
+        return scan_of_points(points_L, elevations, file.columns, stamp_s, X_BL, X_OB)
 
-    def _hear_scan(self, message: Any) -> None:
-        stamp_s = self._stamp(message)
+    def _flat_scan(self, message: Any, stamp_s: float) -> Scan | None:
         X_BL, X_OB = self._X_BF(message.header.frame_id.strip("/")), self._X_OB(stamp_s)
-        if X_BL is not None and X_OB is not None:
-            self._scan = newer(self._scan, readings.usable(readings.flat_scan, message, stamp_s, X_BL, X_OB))
+        return None if X_BL is None or X_OB is None else readings.flat_scan(message, stamp_s, X_BL, X_OB)
 
-    def _hear_imu(self, message: Any) -> None:
-        self._imu = newer(self._imu, readings.imu(message, self._stamp(message)))
+    def _own(self, message: Any, stamp_s: float) -> OwnLocalisation | None:
+        pose, X_OB = planar_pose(message.pose.pose), self._X_OB(stamp_s)
+        return X_OB and OwnLocalisation(stamp_s, compose(pose, inverse(Pose2D.from_transform(X_OB))))
 
     def _hear_force(self, message: Any) -> None:
         force = message.wrench.force
         if math.isfinite(force_n := math.hypot(force.x, force.y, force.z)):
             self._feel(force_n=force_n)
-
-    def _hear_battery(self, message: Any) -> None:
-        if 0.0 <= message.percentage <= 1.0:
-            self._battery = Battery(self._stamp(message), float(message.percentage))
-
-    def _hear_pose(self, message: Any) -> None:
-        stamp_s = self._stamp(message)
-        pose, X_OB = readings.usable(planar_pose, message.pose.pose), self._X_OB(stamp_s)
-        if pose is not None and X_OB is not None:
-            self._place = OwnLocalisation(stamp_s, compose(pose, inverse(Pose2D.from_transform(X_OB))))
 
     def _X_BF(self, frame: str) -> RigidTransform | None:
         """Pose of a fixed frame in the body; None when no static transforms lead there."""

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections import defaultdict
 from collections.abc import Callable
 from concurrent.futures import Executor
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any, Final, Protocol, cast
@@ -56,11 +56,6 @@ class Place:
         what = f"'{text[:60]}' is no ROS domain: domains go to {_MOST_DOMAIN}, ports from 1 to {_MOST_PORT}"
         raise InputError(what, hint="write [DOMAIN] or zenoh:[DOMAIN][@HOST[:PORT]], as in 0 or zenoh:42@192.168.1.5")
 
-    @property
-    def endpoint(self) -> str:
-        """Address of the router as Zenoh writes it."""
-        return f"tcp/{self.host}:{self.port}"
-
 
 class Session(ABC):
     """Open connection to the network of a place."""
@@ -72,6 +67,20 @@ class Session(ABC):
     @abstractmethod
     def node(self, name: str, namespace: str = "/") -> Node:
         """Returns a new node. Raises InputError for a namespace that ROS 2 does not allow."""
+
+
+def open_session(place: Place) -> AbstractContextManager[Session]:
+    """Opens a session over the wire that a place names. Raises InputError."""
+    if not place.by_rclpy:
+        from errand_ros2.wire.zenoh_node import open_zenoh
+
+        return open_zenoh(place)
+    try:
+        from errand_ros2.wire.rclpy_node import open_rclpy
+    except ImportError as error:  # such as that of a ROS 2 for another Python
+        what = f"this Python cannot load rclpy ({str(error).partition(chr(10))[0][:120]})"
+        raise InputError(what, hint="run Errand with the Python of that ROS 2, or write zenoh:") from error
+    return open_rclpy(place)
 
 
 class Publisher(Protocol):

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
 from functools import partial
 from importlib import import_module
+from queue import Empty, SimpleQueue
 from typing import Any, Final
 
 import numpy as np
@@ -86,9 +87,9 @@ class RclpySession(Session):
         self._thread = threading.Thread(target=self._spin, name="errand-rclpy", daemon=True)
         self._thread.start()
 
-    def node(self, name: str, namespace: str = "/") -> RclpyNode:
+    def node(self, name: str, namespace: str = "/") -> _RclpyNode:
         """Makes a node. Raises InputError for a namespace that ROS 2 does not allow."""
-        node = RclpyNode(self, name, namespace)
+        node = _RclpyNode(self, name, namespace)
         node.inner.create_timer(_COMPARE_S, node.compare_all)
         return node
 
@@ -158,44 +159,36 @@ class _Nobody(Publisher, Client):
     def ask(self, request: Any, take: Callable[[Any], None], *, limit_s: float) -> None: ...
 
 
-class RclpyPublisher(Publisher):
+class _RclpyPublisher(Publisher):
     """Publisher of one topic."""
 
-    def __init__(self, node: RclpyNode, topic: str, kind: Any, qos: Qos) -> None:
+    def __init__(self, node: _RclpyNode, topic: str, kind: Any, qos: Qos) -> None:
         self._node, self._kind, self._keeps = node, kind, qos.transient_local
         self._publisher = node.inner.create_publisher(kind, topic, _profile(qos))
 
     @property
     def is_heard(self) -> bool:
-        """Returns whether a subscription exists now, or one may come for the messages that are kept."""
         return self._keeps or self._publisher.get_subscription_count() > 0
 
     def put(self, message: Any) -> None:
-        """Publishes a message, or a mapping of its fields."""
         self._node.sent += 1
         self._publisher.publish(filled(self._kind, message))
 
 
-class RclpyClient(Client):
+class _RclpyClient(Client):
     """Client of a service."""
 
-    def __init__(self, node: RclpyNode, name: str, service: Any) -> None:
+    def __init__(self, node: _RclpyNode, name: str, service: Any) -> None:
         self._request = service.Request
         self._client = node.inner.create_client(service, name, callback_group=node.group)
 
     def call(self, request: Any, *, limit_s: float) -> Any:
-        """Returns the service's response; None when no service answers within the limit (s)."""
-        come, answers, until_s = threading.Event(), list[Any](), time.monotonic() + limit_s
-        if not self._client.wait_for_service(limit_s):
-            return None
-
-        def take(response: Any) -> None:
-            answers.append(response)
-            come.set()
-
-        self._ask(request, take)
-        come.wait(until_s - time.monotonic())
-        return answers[0] if answers else None
+        answers, until_s = SimpleQueue[Any](), time.monotonic() + limit_s
+        if self._client.wait_for_service(limit_s):
+            self._ask(request, answers.put)
+            with suppress(Empty):
+                return answers.get(timeout=max(0.0, until_s - time.monotonic()))
+        return None
 
     def ask(self, request: Any, take: Callable[[Any], None], *, limit_s: float) -> None:
         """Calls `take` with the service's response when it comes; waits until the service is there."""
@@ -210,7 +203,7 @@ class RclpyClient(Client):
         self._client.call_async(filled(self._request, request)).add_done_callback(taken)
 
 
-class RclpyNode(Node):
+class _RclpyNode(Node):
     """Node of rclpy."""
 
     padding = 3  # DDS fills messages up to whole words of four bytes
@@ -224,7 +217,6 @@ class RclpyNode(Node):
         session.executor.add_node(self.inner)
 
     def claim(self, *topics: str) -> None:
-        """Raises InputError when another node publishes one of the topics, which only one may publish."""
         until_s = max(self.session.opened_s + _ALL_KNOWN_S, time.monotonic() + _DISCOVERY_S)
         while (left_s := until_s - time.monotonic()) > 0.0:
             for name in map(self.absolute, topics):
@@ -239,28 +231,27 @@ class RclpyNode(Node):
                 self.compare(name, info.topic_type)
 
     def publisher(self, topic: str, type_name: str, qos: Qos = USUAL) -> Publisher:
-        """Returns a publisher of a topic."""
         name = self.absolute(topic)
         kind = self.session.interface(type_name, name)
-        return _Nobody() if kind is None else RclpyPublisher(self, name, kind, qos)
+        return _Nobody() if kind is None else _RclpyPublisher(self, name, kind, qos)
 
     def subscribe(
         self, topic: str, type_name: str, handle: Callable[[Any], Any], qos: Qos = USUAL, late_s: float = math.inf
     ) -> Callable[[], None]:
-        """Calls `handle` with each message that is not `late_s` late; returns a function that ends the subscription."""
         name, delays = self.absolute(topic), Delays()
         self.types[name].append(type_name)
         if self.types[name][0] != type_name:
-            other = RclpyNode(self.session.beside(), self._name, self.namespace)
+            other = _RclpyNode(self.session.beside(), self._name, self.namespace)
             return other.subscribe(name, type_name, handle, qos, late_s)
         if (kind := self.session.interface(type_name, name)) is None:
             return lambda: None
+        message_type = ros_types().message(type_name)
 
         def received(data: bytes, info: Mapping[str, int]) -> None:
             took_s = 1e-9 * (time.time_ns() - info["source_timestamp"])
             if late_s < math.inf and delays.of(b"", took_s) > late_s:
                 return
-            self.take(ros_types().message(type_name), data, handle, name)
+            self.take(message_type, data, handle, name)
 
         subscription = self.inner.create_subscription(
             kind, name, received, _profile(qos), callback_group=self.group, raw=True
@@ -269,7 +260,6 @@ class RclpyNode(Node):
         return lambda: executor.create_task(end) and None  # in its thread, which may be reading the subscription
 
     def serve(self, name: str, type_name: str, handle: Callable[[Request], None]) -> None:
-        """Calls `handle` with each request for a service; it may answer later."""
         name, executor = self.absolute(name), self.session.executor
         if (service := self.session.interface(type_name, name)) is None:
             return
@@ -287,10 +277,9 @@ class RclpyNode(Node):
         self.inner.create_service(service, name, asked, callback_group=self.group)
 
     def client(self, name: str, type_name: str) -> Client:
-        """Returns a client of a service."""
         name = self.absolute(name)
         service = self.session.interface(type_name, name)
-        return _Nobody() if service is None else RclpyClient(self, name, service)
+        return _Nobody() if service is None else _RclpyClient(self, name, service)
 
 
 def _profile(qos: Qos) -> QoSProfile:

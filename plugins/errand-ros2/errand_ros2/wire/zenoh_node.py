@@ -30,7 +30,7 @@ class ZenohSession(Session):
 
     def __init__(self, inner: zenoh.Session, place: Place, is_router: bool) -> None:
         router = "the router is here" if is_router else "by its router"
-        super().__init__(place, f"domain {place.domain}, Zenoh at {place.endpoint} ({router})")
+        super().__init__(place, f"domain {place.domain}, Zenoh at tcp/{place.host}:{place.port} ({router})")
         self.inner, self.is_router = inner, is_router
         self.numbers, self.liveliness = count(), inner.liveliness()
 
@@ -50,7 +50,7 @@ def open_zenoh(place: Place) -> Iterator[ZenohSession]:
 
     A session that is a client waits for its router again when the router restarts.
     """
-    client, endpoints = False, {"endpoints": [place.endpoint]}
+    client, endpoints = False, {"endpoints": [f"tcp/{place.host}:{place.port}"]}
     with suppress(OSError, UnicodeError):
         socket.create_connection((place.host.strip("[]"), place.port), timeout=0.5).close()
         client = True

@@ -11,8 +11,8 @@ from errand_ros2.adapter.clocks import RobotClock
 from errand_ros2.adapter.description import described, served_file
 from errand_ros2.adapter.robot import Ros2Robot
 from errand_ros2.server import PERIOD_S, RobotServer
-from errand_ros2.wire.node import open_session
-from errand_ros2.wire.zenoh_node import ZenohClient, ZenohPublisher
+from errand_ros2.wire.node import Publisher, open_session
+from errand_ros2.wire.zenoh_node import ZenohClient
 from plant.robots.spot.kind import spot_capabilities
 from skills.testing.blocks import Block
 from skills.testing.clock import VirtualClock
@@ -115,7 +115,7 @@ class LockStep(RobotClock):
     @contextmanager
     def cut(self):
         """Loses every message of both sides while the block lasts; the clocks go on."""
-        ways = (ZenohPublisher, "put"), (ZenohClient, "call"), (ZenohClient, "ask")
+        ways = (Publisher, "put"), (ZenohClient, "call"), (ZenohClient, "ask")
         kept = {way: getattr(*way) for way in ways}
         for kind, name in ways:
             setattr(kind, name, lambda *_, **__: None)

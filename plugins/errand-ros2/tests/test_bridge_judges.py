@@ -152,15 +152,16 @@ def test_random_bytes_from_rclpy_on_every_topic_of_a_run_move_nothing(tmp_path, 
     topics = {f"{space}/{name}": kind for name, kind in INPUTS.items() for space in ("", "/alice")}
     topics["/alice/say"] = STRING
     with run_of_alice(tmp_path, place) as ros, open_session(place) as others:
-        senders = [ros.publisher(topic, kind) for topic, kind in topics.items()]
-        stamped_type = "geometry_msgs/msg/TwistStamped"
-        senders += [others.node("other").publisher(f"{space}/cmd_vel", stamped_type) for space in ("", "/alice")]
-        assert soon(lambda: all(each.is_heard for each in senders))
+        rows, other = [(ros.node, topic, kind) for topic, kind in topics.items()], others.node("other")
+        rows += [(other, f"{space}/cmd_vel", "geometry_msgs/msg/TwistStamped") for space in ("", "/alice")]
+        kinds = [node.session.interface(kind, topic) for node, topic, kind in rows]
+        senders = [
+            node.inner.create_publisher(kind, topic, 10) for (node, topic, _), kind in zip(rows, kinds, strict=True)
+        ]
+        assert soon(lambda: all(each.get_subscription_count() for each in senders))
         for sender in senders:
-            for number, data in enumerate(
-                chunks(chance, 44 if "cmd_vel" in sender._publisher.topic else 9000, b"\0\1\0\0")
-            ):
-                sender._publisher.publish(data)
+            for number, data in enumerate(chunks(chance, 44 if "cmd_vel" in sender.topic else 9000, b"\0\1\0\0")):
+                sender.publish(data)
                 if number % 10 == 0:
                     ros.step()
         ros.step(10)

@@ -83,15 +83,21 @@ def open_session(place: Place) -> AbstractContextManager[Session]:
     return open_rclpy(place)
 
 
-class Publisher(Protocol):
+class Publisher:
     """Publisher of one topic. Late subscribers get the last messages if its quality of service says so."""
+
+    def __init__(self, node: Node, send: Callable[[Any], Any], has_subscriptions: Callable[[], bool]) -> None:
+        self._node, self._send, self._has_subscriptions = node, send, has_subscriptions
 
     @property
     def is_heard(self) -> bool:
         """Returns whether a subscription exists now, or one may come for the messages that are kept."""
+        return self._has_subscriptions()
 
     def put(self, message: Any) -> None:
         """Publishes a message, or a mapping of its fields."""
+        self._node.sent += 1
+        self._send(message)
 
 
 class Client(Protocol):

@@ -149,30 +149,11 @@ def open_rclpy(place: Place) -> Iterator[RclpySession]:
         yield session
 
 
-class _Nobody(Publisher, Client):
-    """Publisher and client of what needs an interface that is not installed."""
+class _Nobody(Client):
+    """Client of what needs an interface that is not installed."""
 
-    is_heard = False
-
-    def put(self, message: Any) -> None: ...
     def call(self, request: Any, *, limit_s: float) -> Any: ...
     def ask(self, request: Any, take: Callable[[Any], None], *, limit_s: float) -> None: ...
-
-
-class _RclpyPublisher(Publisher):
-    """Publisher of one topic."""
-
-    def __init__(self, node: _RclpyNode, topic: str, kind: Any, qos: Qos) -> None:
-        self._node, self._kind, self._keeps = node, kind, qos.transient_local
-        self._publisher = node.inner.create_publisher(kind, topic, _profile(qos))
-
-    @property
-    def is_heard(self) -> bool:
-        return self._keeps or self._publisher.get_subscription_count() > 0
-
-    def put(self, message: Any) -> None:
-        self._node.sent += 1
-        self._publisher.publish(filled(self._kind, message))
 
 
 class _RclpyClient(Client):
@@ -232,8 +213,11 @@ class _RclpyNode(Node):
 
     def publisher(self, topic: str, type_name: str, qos: Qos = USUAL) -> Publisher:
         name = self.absolute(topic)
-        kind = self.session.interface(type_name, name)
-        return _Nobody() if kind is None else _RclpyPublisher(self, name, kind, qos)
+        if (kind := self.session.interface(type_name, name)) is None:
+            return Publisher(self, lambda message: None, lambda: False)
+        made = self.inner.create_publisher(kind, name, _profile(qos))
+        heard = lambda: qos.transient_local or made.get_subscription_count() > 0  # noqa: E731
+        return Publisher(self, lambda message: made.publish(filled(kind, message)), heard)
 
     def subscribe(
         self, topic: str, type_name: str, handle: Callable[[Any], Any], qos: Qos = USUAL, late_s: float = math.inf

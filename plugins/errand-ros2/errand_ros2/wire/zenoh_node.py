@@ -67,33 +67,6 @@ def open_zenoh(place: Place) -> Iterator[ZenohSession]:
         yield ZenohSession(inner, place, is_router=not client)
 
 
-class ZenohPublisher(Publisher):
-    """Publisher of one topic, with a cache for late subscribers if its quality of service says so."""
-
-    def __init__(self, node: ZenohNode, topic: str, kind: MessageType, qos: Qos) -> None:
-        self._node, self._kind, self._numbers = node, kind, count(1)
-        key, self._gid = node.key.data_key(topic, kind.key), node.declare(types.PUBLISHER, topic, kind.key, qos)
-        priority = zenoh.Priority.DATA if qos.reliable else zenoh.Priority.DATA_LOW  # pictures wait apart, and get lost
-        how: dict[str, Any] = {"encoding": _CDR, "reliability": zenoh.Reliability.RELIABLE, "priority": priority}
-        declare: Callable[..., Any] = node.session.inner.declare_publisher
-        if qos.transient_local:
-            how |= {"cache": ext.CacheConfig(max_samples=qos.depth), "publisher_detection": True}
-            declare = partial(ext.declare_advanced_publisher, node.session.inner)
-        self._publisher = declare(key, **how)
-
-    @property
-    def is_heard(self) -> bool:
-        """Returns whether a subscription exists now, or one may come for the cached messages."""
-        status = getattr(self._publisher, "matching_status", True)  # one with a cache has none
-        return bool(getattr(status, "matching", status))
-
-    def put(self, message: Any) -> None:
-        """Publishes a message, or a mapping of its fields."""
-        self._node.sent += 1
-        attachment = Attachment(next(self._numbers), time.time_ns(), self._gid).encoded()
-        self._publisher.put(self._kind.encode(message), attachment=attachment)
-
-
 class ZenohClient(Client):
     """Client of a service."""
 
@@ -151,11 +124,23 @@ class ZenohNode(Node):
         self._declared.append(self.session.liveliness.declare_token(token))
         return types.gid_of(token)
 
-    def publisher(self, topic: str, type_name: str, qos: Qos = USUAL) -> ZenohPublisher:
-        """Returns a publisher of a topic."""
-        made = ZenohPublisher(self, self.absolute(topic), ros_types().message(type_name), qos)
+    def publisher(self, topic: str, type_name: str, qos: Qos = USUAL) -> Publisher:
+        """Returns a publisher of a topic, with a cache for late subscribers if its quality of service says so."""
+        name, kind, numbers, inner = self.absolute(topic), ros_types().message(type_name), count(1), self.session.inner
+        gid = self.declare(types.PUBLISHER, name, kind.key, qos)
+        priority = zenoh.Priority.DATA if qos.reliable else zenoh.Priority.DATA_LOW  # pictures wait apart, and get lost
+        how: dict[str, Any] = {"encoding": _CDR, "reliability": zenoh.Reliability.RELIABLE, "priority": priority}
+        if qos.transient_local:
+            cached: dict[str, Any] = {"cache": ext.CacheConfig(max_samples=qos.depth), "publisher_detection": True}
+            made: Any = ext.declare_advanced_publisher(inner, self.key.data_key(name, kind.key), **how, **cached)
+        else:
+            made = inner.declare_publisher(self.key.data_key(name, kind.key), **how)
         self._declared.append(made)  # Zenoh ends what nobody refers to
-        return made
+
+        def send(message: Any) -> None:
+            made.put(kind.encode(message), attachment=Attachment(next(numbers), time.time_ns(), gid).encoded())
+
+        return Publisher(self, send, lambda: qos.transient_local or bool(made.matching_status.matching))
 
     def subscribe(
         self, topic: str, type_name: str, handle: Callable[[Any], Any], qos: Qos = USUAL, late_s: float = math.inf

@@ -211,11 +211,13 @@ def test_random_bytes_from_rclpy_are_dropped_and_counted(capfd):
     place, chance, heard = Place(os.getpid() % 200, by_rclpy=True), np.random.default_rng(1), []
     kind = "sensor_msgs/msg/JointState"
     with open_session(place) as session, open_session(place) as others:
-        node, sender = session.node("errand", "/alice"), others.node("other").publisher("/alice/joint_states", kind)
+        node, other = session.node("errand", "/alice"), others.node("other")
         node.subscribe("joint_states", kind, heard.append)
-        assert soon(lambda: sender.is_heard)
+        sender = other.publisher("/alice/joint_states", kind)
+        raw = other.inner.create_publisher(others.interface(kind, "this test"), "/alice/joint_states", 10)
+        assert soon(lambda: sender.is_heard and raw.get_subscription_count())
         for _ in range(400):
-            sender._publisher.publish(b"\0\1\0\0" + chance.bytes(int(chance.integers(1, 1000))))
+            raw.publish(b"\0\1\0\0" + chance.bytes(int(chance.integers(1, 1000))))
             time.sleep(0.001)
         sender.put({"name": ["good"]})
         assert soon(lambda: heard and heard[-1].name == ["good"])

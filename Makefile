@@ -14,7 +14,6 @@
 
 PYTHON ?= $(shell command -v python3.11 || echo python3)
 VENV := .venv
-ROS := .ros
 BIN := $(VENV)/bin
 PLUGINS := $(wildcard plugins/*)
 # Modules are compiled when they are first imported; most of a package's never are.
@@ -26,7 +25,7 @@ DEBIAN := libegl1 libgl1 libgl1-mesa-dri libglib2.0-0 libsm6 libx11-6
 # What some tests need; without it those are skipped, and fail where CI is set.
 VOICES := flite espeak-ng
 BROWSER := chromium
-# What builds interfaces of ROS 2; without it the tests over rclpy are left out.
+# What builds interfaces of ROS 2; without it the job of ROS 2 is skipped.
 ROS_TOOLS := make g++ cmake ament-cmake ament-cmake-python ament-cmake-ros python3-ament-package
 # One more than there are processors, since tests of pages and of processes wait.
 JOBS ?= $(shell expr $$(nproc) + 1)
@@ -100,13 +99,9 @@ fast: env
 nightly: env voices browser
 	$(PYTEST) -m nightly --durations-file=out/tests/nightly.json
 
-ros: $(ROS)/.ready
-	if [ -e $< ]; then $(ROS)/bin/python -m pytest -n 0 plugins/errand-ros2/tests/wire $(wildcard plugins/errand-ros2/tests/test_rclpy*.py plugins/errand-ros2/tests/test_nav2_drive.py); fi
-
-# Errand's own packages are those of .venv.
-$(ROS)/.ready: $(VENV)/.ready plugins/errand-ros2/pyproject.toml .ci/ros $(shell find plugins/errand-ros2/errand_ros2/interfaces -type f)
+ros: env
 	$(call install_for,$(ROS_TOOLS),tests over rclpy)
-	.ci/ros && touch $@ || [ $$? = 2 -a -z "$$CI" ]
+	.ci/ros
 
 check: env
 	$(BIN)/ruff check .
@@ -138,4 +133,4 @@ $(VENV)/.docs: $(VENV)/.ready
 	@touch $@
 
 clean:
-	rm -rf $(VENV) $(ROS) out build dist *.egg-info plugins/*/build plugins/*/*.egg-info
+	rm -rf $(VENV) .ros out build dist *.egg-info plugins/*/build plugins/*/*.egg-info

@@ -40,6 +40,7 @@ from skills.grid_map import GridMap, load_grid_map
 
 _LOG: Final = logging.getLogger(__name__)
 _STATES: Final = {True: {"id": 3, "label": "active"}, False: {"id": 2, "label": "inactive"}}  # of a lifecycle node
+_GET_STATE: Final = "lifecycle_msgs/srv/GetState"
 _EVENTS: Final = frozenset({"transitions", "control", "outcome", "speech", "errors", "object_to_detect"})
 """Topics of the log whose messages are published as events."""
 _TOPICS: Final = {
@@ -130,9 +131,7 @@ class Bridge(RunVisitor):
         node.subscribe("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped", own.initial.append)
         own.driving.listen(node, lambda: 0.0 if own.context is None else own.context.clock.now())
         for name in ("amcl", "bt_navigator"):  # whose states nav2_simple_commander awaits
-            node.answer(
-                f"{name}/get_state", "lifecycle_msgs/srv/GetState", lambda _: {"current_state": _STATES[own.is_active]}
-            )
+            node.answer(f"{name}/get_state", _GET_STATE, lambda _: {"current_state": _STATES[own.is_active]})
 
     def _obey(self, name: str, what: str, _: Any) -> Fields:
         """Answers a service by its command to a robot, or by the reason why it is refused."""

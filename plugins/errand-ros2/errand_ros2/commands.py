@@ -18,11 +18,6 @@ from skills.quantities import Delay, Seed
 ros2 = typer.Typer(name="ros2", help="Bags, and interface packages.", no_args_is_help=True, rich_markup_mode=None)
 
 
-@ros2.callback()
-def _group() -> None:
-    """Bags, and interface packages."""
-
-
 @ros2.command()
 def bag(
     file: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run, or its log.mcap.", show_default=False)],

@@ -56,7 +56,6 @@ class _Pursued:
     source: str
     goal: Goal | None
     poses: tuple[Pose2D, ...]
-    mission: str
     stop: CompiledTree
     since_s: float | None = None
     passed: int = 0
@@ -83,8 +82,7 @@ class Goals:
         }
 
     def _accept_goal(self, action: str, goal: Goal) -> bool:
-        message = goal.message
-        poses = [message.pose] if hasattr(message, "pose") else getattr(message, "poses", [])
+        poses = [goal.message.pose] if hasattr(goal.message, "pose") else getattr(goal.message, "poses", [])
         return self.accept(action, goal, getattr(poses, "goals", poses))
 
     def accept(self, source: str, goal: Goal | None, stamped: Sequence[Any]) -> bool:
@@ -99,10 +97,9 @@ class Goals:
     def _cancel(self, goal: Goal) -> None:
         """Ends a goal's mission; the run stops the robot before its clock's next step."""
         with self._lock:
-            found = next((each for each in self._pursued.values() if each.goal is goal), None)
-            if found is not None:
+            for name in [name for name, each in self._pursued.items() if each.goal is goal]:
                 with suppress(ValueError):  # it is being cancelled already
-                    self._control.replace(found.stop, instead_of=found.mission)
+                    self._control.replace(self._pursued[name].stop, instead_of=name)
                 self._hurry.set()
 
     def _pursue(self, source: str, goal: Goal | None, poses: tuple[Pose2D, ...]) -> None:
@@ -116,7 +113,7 @@ class Goals:
         tree, stop = self._compiled(mission), self._compiled(self._mission_of(f"{name} cancelled", _STOP))
         with self._lock:
             before = next(reversed(self._pursued), None)
-            self._pursued[name] = _Pursued(source, goal, poses, name, stop)
+            self._pursued[name] = _Pursued(source, goal, poses, stop)
             try:
                 if before is None:
                     self._control.preempt(tree)
@@ -157,7 +154,7 @@ class Goals:
             action = self._actions[each.source]
             if each.since_s is None:
                 each.since_s = now_s
-                action.begin(each.goal)
+                action.set_status(each.goal, GoalStatus.EXECUTING)
             if each.source == _MISSION:
                 states = progress.states[self._name].items()
                 running = [(path, at.message) for path, at in states if at.status is Status.RUNNING]

@@ -20,7 +20,6 @@ from skills.footprint import clearance_on_grid
 from skills.grid_map import GridMap
 from skills.robot import Battery, FloatArray, Image, Imu, Intrinsics, Joints, Odometry, Pose2D, Scan
 
-_PREFIX: Final = re.compile(r"[<\s](\w+):\w")
 _NAMESPACES: Final = {"drake": "http://drake.mit.edu", "xacro": "http://ros.org/wiki/xacro"}
 MAP_FRAME: Final = "map"  # it equals the frame "world" of logs
 LEAST_RANGE_M, MOST_RANGE_M, _FLOAT32 = 0.05, 100.0, 7  # the last is a type of sensor_msgs/PointField
@@ -69,8 +68,8 @@ def moved(head: Fields, child: str, at: Mapping[str, Any]) -> Fields:
 
 def well_formed(urdf: str) -> str:
     """Returns a URDF whose root declares each prefix that it uses, as XML asks and Drake does not."""
-    used = sorted({each for each in _PREFIX.findall(urdf) if each in _NAMESPACES and f"xmlns:{each}" not in urdf})
-    declared = "".join(f' xmlns:{each}="{_NAMESPACES[each]}"' for each in used)
+    used = {each: uri for each, uri in _NAMESPACES.items() if f"{each}:" in urdf and f"xmlns:{each}" not in urdf}
+    declared = "".join(f' xmlns:{each}="{uri}"' for each, uri in used.items())
     return re.sub(r"<robot\b", f"<robot{declared}", urdf, count=1)
 
 

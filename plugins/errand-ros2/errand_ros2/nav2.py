@@ -15,7 +15,7 @@ import numpy as np
 from errand_ros2.messages import MAP_FRAME, Fields, pose_stamped
 from errand_ros2.readings import planar_pose
 from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError, SentGoal
-from errand_ros2.wire.node import Place, open_session
+from errand_ros2.wire.node import Place, Publisher, open_session
 from errand_ros2.wire.types import ros_types
 from skills.api import Cause, FreeSpace, PlanningError
 from skills.footprint import Footprint, footprint_clearance_m, pose_array
@@ -30,7 +30,7 @@ from skills.routine import SkillFailure
 
 _PLAN: Final = "nav2_msgs/action/ComputePathToPose"
 _TO_POSE, _THROUGH = (f"nav2_msgs/action/{each}" for each in ("NavigateToPose", "NavigateThroughPoses"))
-_STEP_M: Final = 0.05
+_LIMIT, _STEP_M = "nav2_msgs/msg/SpeedLimit", 0.05
 
 
 @cache
@@ -108,7 +108,8 @@ class Nav2:
 class Nav2Drive(FollowerOptions):
     """Whole drives by the robot's own Nav2: its action `navigate_to_pose` gets the goal of each path.
 
-    With `through_m`, poses of the path so far apart (m) go to its action `navigate_through_poses`. `action` is the
+    With `through_m`, poses of the path so far apart (m) go to its action `navigate_through_poses`. Its topic
+    `speed_limit` gets what zones, people and the mission allow below `max_speed_m_s`, Nav2's own. `action` is the
     action's absolute name, `behavior_tree` that of Nav2's file; `network` and `map_pose` as for the planner `nav2`.
     Nav2 must accept a goal within `limit_s` (of the wall clock), and send feedback each `silent_s` (of the robot's).
     Within `near_m` of the goal Errand drives by the options of `path_follower`: Nav2 stops less exactly.
@@ -140,6 +141,7 @@ class _Trip:
         self.left_m, self.heard, self.over = 0.0, 0, threading.Event()
         self.sent: SentGoal | None = None
         self.failure: SkillFailure | None = None
+        self._limit: Publisher | None = None
         threading.Thread(target=self._pursue, args=(options, poses), daemon=True).start()
 
     def _pursue(self, options: Nav2Drive, poses: Sequence[Fields]) -> None:
@@ -149,18 +151,25 @@ class _Trip:
             with open_session(Place.parse(options.network)) as session:
                 node, told = session.node("errand_drive"), f" ({session.told})"
                 node.subscribe(f"{options.action}/_action/feedback", f"{kind}_FeedbackMessage", self._hear)
+                self._limit = node.publisher(f"{options.action.rpartition('/')[0]}/speed_limit", _LIMIT)
                 client = ActionClient(node, options.action, kind)
                 if (sent := _sent(client, options, poses)) is None:
                     self.failure = SkillFailure(Cause.PLANNING, f"Nav2 rejects the goal on {options.action}.")
                     return
                 self.sent = sent
                 self.over.wait()
+                self.limit_to(math.inf)
                 if not sent.ended.is_set():
                     client.cancel(sent)
                     sent.ended.wait(options.limit_s)
         except Exception as error:  # of the wire, too
             what = f"There is no drive by Nav2 on {options.action}{told}: {error}."
             self.failure = SkillFailure(Cause.PRECONDITION, what, final=True)
+
+    def limit_to(self, most_m_s: float) -> None:
+        """Tells Nav2 a speed limit, once it pursues the goal; infinity lifts it."""
+        if self._limit is not None and self.sent is not None:
+            self._limit.put({"speed_limit": most_m_s if most_m_s < math.inf else 0.0})
 
     def _hear(self, message: Any) -> None:
         if self.sent is not None and bytes(message.goal_id.uuid) == bytes(self.sent.identity["uuid"]):
@@ -215,6 +224,7 @@ class Nav2Follower(PathFollower):
             self.halt()
             self._end(trip.sent, pose, costmap)
             return stands
+        trip.limit_to(most_m_s if most_m_s < self._by.max_speed_m_s else math.inf)
         is_silent = trip.sent is not None and trip.heard == self._heard
         self._heard, self._silent_s = trip.heard, self._silent_s + self._by.period_s if is_silent else 0.0
         if self._silent_s > self._by.silent_s:

@@ -56,7 +56,7 @@ class PartActions:
         is_due = now_s >= self._due_s - _EPSILON_S
         for server, goal, command in list(self._goals):
             if goal.status is GoalStatus.ACCEPTED:
-                server.begin(goal)
+                server.set_status(goal, GoalStatus.EXECUTING)
             status = self._robot.command_status(command)
             if status.state is not CommandState.RUNNING:
                 self._goals.remove((server, goal, command))

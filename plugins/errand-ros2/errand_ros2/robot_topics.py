@@ -105,8 +105,7 @@ class RobotTopics:
         frames.fix(*(messages.transform(0.0, self._body, each.frame, each.camera.X_FC) for each in on_body))
         others = {f"{space}/base_link": self._body, **{f"{each.frame}_optical": each.frame for each in self._streams}}
         frames.fix(*(messages.transform(0.0, frame, name, RigidTransform()) for name, frame in others.items()))
-        self.stamps_s: dict[str, float] = {}
-        """Times of the last odometry and scan that were published, by topic."""
+        self.stamps_s: dict[str, float] = {}  # of the last odometry and scan that were published, by topic
         self._battery_due_s = 0.0
 
     def publish(self, now_s: float, X_WO: RigidTransform | None) -> None:
@@ -136,12 +135,11 @@ class RobotTopics:
 
     def publish_pictures(self, now_s: float) -> None:
         """Publishes the pictures for which subscriptions wait."""
-        for stream in self._streams:
-            if now_s >= stream.due_s - _EPSILON_S and any(each.is_heard for each, _ in stream.out):
-                stream.due_s = now_s + self.image_period_s
+        for at in self._streams:
+            if now_s >= at.due_s - _EPSILON_S and any(each.is_heard for each, _ in at.out):
+                at.due_s = now_s + self.image_period_s
                 with suppress(NoImageError):
-                    source, depth = stream.camera.source, stream.depth
-                    self._publish_picture(stream, self._robot.image(source, visual=not depth, depth=depth))
+                    self._publish_picture(at, self._robot.image(at.camera.source, visual=not at.depth, depth=at.depth))
 
     def _publish_scan(self) -> None:
         scan = self._robot.scan()

@@ -32,7 +32,7 @@ class ScriptedNav2:
 
     `rejects`, `is_deaf` to goals, `dies` after acceptance (neither feedback nor result), aborts with the code `fails`
     and what it `says`, `lies` that it has arrived. `poses` are those of the last goal; `told` counts feedback messages,
-    `cancelled` goals.
+    `cancelled` goals; `limits_m_s` are the speed limits that it was told.
     """
 
     def __init__(self, session, action=TO_POSE, space="/alice"):
@@ -41,6 +41,8 @@ class ScriptedNav2:
         self.goals, self.poses, self.told, self.cancelled = [], [], 0, 0
         self._goal, self._left, self._pool = None, [], ThreadPoolExecutor(2)
         self.name, node = f"{space}/{action}", session.node("bt_navigator", space)
+        self.limits_m_s = []
+        node.subscribe("speed_limit", "nav2_msgs/msg/SpeedLimit", lambda told: self.limits_m_s.append(told.speed_limit))
         self._server = ActionServer(
             node, action, KINDS[action], accept=self._accept, cancel=self._cancel, pool=self._pool
         )

@@ -126,6 +126,15 @@ def test_a_drive_that_nav2_aborts_fails_with_its_cause(given, code, says, cause,
     assert (failure.cause, failure.final, failure.message) == (cause, final, f"Nav2 gave up: {words}.")
 
 
+def test_nav2_is_told_the_speed_that_zones_and_people_allow_until_the_drive_ends(given):
+    nav2, options = given
+    drives, told = Drives(options), nav2.limits_m_s
+    for most_m_s, limit_m_s in ((0.8, 0.0), (0.3, 0.3), (0.8, 0.0), (0.5, 0.5)):
+        assert soon(lambda most=most_m_s, limit=limit_m_s: drives.tick(most) and told[-1:] == [limit])
+    drives.follower.halt()
+    assert soon(lambda: told[-1] == 0.0)
+
+
 def test_a_rejected_goal_is_a_failure(given):
     nav2, options = given
     nav2.rejects = True

@@ -162,9 +162,10 @@ class Ros2Robot(SensedRobot):
 
     def _fall_silent(self, silent_s: float) -> None:
         """Ends the running commands of a silent robot; their parts are stopped when it answers again."""
+        old = f"the last state is {silent_s:.1f} s old"
         for part in PARTS[:-1]:
             if (active := self._commands.running(part)) is not None:
-                self._halt(part, CommandState.STOPPED, _old(silent_s), CommandCause.NO_ANSWER)
+                self._halt(part, CommandState.STOPPED, old, CommandCause.NO_ANSWER)
                 self._unsure[part] = active.goal
 
     def _follow(self, part: str, now_s: float) -> None:
@@ -251,9 +252,5 @@ class Ros2Robot(SensedRobot):
         if refused := refusal_of(part, self._leases.refusal(lease), values, until_s=until_s, now_s=now_s):
             return self._commands.refuse(*refused)
         if silent_s > OLD_STATE_S:
-            return self._commands.refuse(f"{part}: {_old(silent_s)}", CommandCause.NO_ANSWER)
+            return self._commands.refuse(f"{part}: the last state is {silent_s:.1f} s old", CommandCause.NO_ANSWER)
         return None
-
-
-def _old(silent_s: float) -> str:
-    return f"the last state is {silent_s:.1f} s old"

@@ -64,10 +64,6 @@ class ActionServer:
         node.serve(f"{base}/send_goal", f"{kind}_SendGoal", node.later(pool, self._send_goal))
         node.serve(f"{base}/get_result", f"{kind}_GetResult", self._get_result)
 
-    def begin(self, goal: Goal) -> None:
-        """Records that a goal is being pursued."""
-        self._set(goal, GoalStatus.EXECUTING)
-
     def tell(self, goal: Goal, **feedback: Any) -> None:
         """Publishes feedback on a goal by its fields."""
         self._feedback.put({"goal_id": goal.identity, "feedback": feedback})
@@ -78,11 +74,12 @@ class ActionServer:
             if goal.has_ended:
                 return
             goal.result, waiting, goal.waiting = self._result(**result), goal.waiting, []
-            self._set(goal, status)
+            self.set_status(goal, status)
         for request in waiting:
             self._reply(request, goal)
 
-    def _set(self, goal: Goal, status: GoalStatus) -> None:
+    def set_status(self, goal: Goal, status: GoalStatus) -> None:
+        """Records how far a goal is, unless it has ended."""
         with self._lock:
             if goal.has_ended:
                 return
@@ -96,7 +93,9 @@ class ActionServer:
         with self._lock:
             is_new = identity not in self._goals
             if is_new:
-                self._forget()
+                ended = [each for each, other in self._goals.items() if other.has_ended]
+                for each in ended[: max(0, len(self._goals) - MOST_GOALS + 1)]:
+                    del self._goals[each]
                 self._goals[identity] = goal
         accepted = False
         try:
@@ -106,11 +105,6 @@ class ActionServer:
                 with self._lock:
                     self._goals.pop(identity, None)
             request.reply({"accepted": accepted, "stamp": goal.info["stamp"]})
-
-    def _forget(self) -> None:
-        ended = [each for each, goal in self._goals.items() if goal.has_ended]
-        for identity in ended[: max(0, len(self._goals) - MOST_GOALS + 1)]:
-            del self._goals[identity]
 
     def _cancel_goal(self, request: Request) -> None:
         """Cancels one goal, or all goals up to a time, or all."""
@@ -122,7 +116,7 @@ class ActionServer:
             asked = [each for each in self._goals.values() if every or each is named or each.accepted_ns <= until_ns]
             found = [goal for goal in asked if not goal.has_ended]
             for goal in found:
-                self._set(goal, GoalStatus.CANCELING)
+                self.set_status(goal, GoalStatus.CANCELING)
         for goal in found:
             self._cancel(goal)
         code = _REJECTED if not any(identity) else _UNKNOWN_GOAL if named is None else _TERMINATED

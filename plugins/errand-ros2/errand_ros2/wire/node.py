@@ -10,10 +10,10 @@ from abc import ABC, abstractmethod
 from collections import defaultdict
 from collections.abc import Callable
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager, suppress
+from contextlib import AbstractContextManager, closing, suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
-from typing import Any, Final, Protocol, cast
+from typing import Any, Final, cast
 
 from errand_ros2.wire.types import USUAL, MalformedError, MessageType, Qos, topic_name
 from skills.inputs.errors import InputError
@@ -58,10 +58,9 @@ class Place:
 
 
 class Session(ABC):
-    """Open connection to the network of a place."""
+    """Open connection to the network of a place; `told` says in words over which wire."""
 
     def __init__(self, place: Place, told: str) -> None:
-        """`told` says in words over which wire it speaks."""
         self.place, self.told = place, told
 
     @abstractmethod
@@ -76,11 +75,11 @@ def open_session(place: Place) -> AbstractContextManager[Session]:
 
         return open_zenoh(place)
     try:
-        from errand_ros2.wire.rclpy_node import open_rclpy
+        from errand_ros2.wire.rclpy_node import RclpySession
     except ImportError as error:  # such as that of a ROS 2 for another Python
         what = f"this Python cannot load rclpy ({str(error).partition(chr(10))[0][:120]})"
         raise InputError(what, hint="run Errand with the Python of that ROS 2, or write zenoh:") from error
-    return open_rclpy(place)
+    return closing(RclpySession(place))
 
 
 class Publisher:
@@ -100,8 +99,8 @@ class Publisher:
         self._send(message)
 
 
-class Client(Protocol):
-    """Client of a service."""
+class Client:
+    """Client of a service; as it stands, of one whose interface is not installed."""
 
     def call(self, request: Any, *, limit_s: float) -> Any:
         """Returns the service's response; None when no service answers within the limit (s)."""
@@ -129,8 +128,7 @@ class Node(ABC):
     def __init__(self, namespace: str) -> None:
         self.namespace = "/" if namespace == "/" else topic_name(namespace)
         self.types = defaultdict[str, list[str]](list)  # of the topics that are subscribed to
-        self.sent, self.handled, self.dropped = 0, 0, 0
-        """Numbers of the messages that were published, handled, and could not be decoded."""
+        self.sent, self.handled, self.dropped = 0, 0, 0  # messages published, handled, and not decoded
 
     @abstractmethod
     def claim(self, *topics: str) -> None:

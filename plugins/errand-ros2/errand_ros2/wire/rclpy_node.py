@@ -8,8 +8,8 @@ import math
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import partial
 from importlib import import_module
 from queue import Empty, SimpleQueue
@@ -35,19 +35,15 @@ _DISCOVERY_S, _COMPARE_S = 1.0, 2.0  # after which publishers of other nodes are
 _ALL_KNOWN_S, _LOOK_S = 4.0, 0.1  # the same after a session began on a busy machine; period of a claim's looks
 
 
-class NotInstalledError(Exception):
-    """Error of an interface that this ROS 2 does not have, or of no middleware."""
-
-
 def interface(name: str) -> Any:
-    """Returns the class of a message, service or part of an action by its name. Raises NotInstalledError."""
+    """Returns the class of a message, service or part of an action by its name. Raises ImportError."""
     package, kind, base = name.split("/")
     base, _, part = base.partition("_")
     try:
         found = getattr(import_module(f"{package}.{kind}"), base)
         return getattr(found.Impl, part if part == "FeedbackMessage" else f"{part}Service") if part else found
     except (ImportError, AttributeError) as error:
-        raise NotInstalledError(package) from error
+        raise ImportError(name=package) from error
 
 
 def filled(kind: Any, given: Any) -> Any:
@@ -78,10 +74,16 @@ def _filled(usual: Any, described: str, value: Any) -> Any:
 class RclpySession(Session):
     """Context of rclpy, with the thread that calls its handlers."""
 
-    def __init__(self, place: Place, context: Context) -> None:
+    def __init__(self, place: Place) -> None:
+        """Joins the place's domain. Raises InputError when rclpy has no middleware."""
+        self.context, self.missing, self.opened_s = Context(), set[str](), time.monotonic()
+        try:
+            rclpy.init(context=self.context, domain_id=place.domain, signal_handler_options=SignalHandlerOptions.NO)
+        except Exception as error:  # rclpy raises what its middleware raises
+            what = f"rclpy does not start ({str(error).partition(chr(10))[0][:120]})"
+            raise InputError(what, hint="source ROS 2 in this terminal, or write zenoh:") from error
         super().__init__(place, f"domain {place.domain}, rclpy with {get_rmw_implementation_identifier()}")
-        self.context, self.missing, self.opened_s = context, set[str](), time.monotonic()
-        self.executor = SingleThreadedExecutor(context=context)
+        self.executor = SingleThreadedExecutor(context=self.context)
         self.nodes: list[rclpy.node.Node] = []
         self._beside: RclpySession | None = None
         self._thread = threading.Thread(target=self._spin, name="errand-rclpy", daemon=True)
@@ -95,15 +97,15 @@ class RclpySession(Session):
 
     def beside(self) -> RclpySession:
         """Returns a second session, since no participant of DDS has two types of one topic."""
-        self._beside = self._beside or RclpySession(self.place, started(self.place))
+        self._beside = self._beside or RclpySession(self.place)
         return self._beside
 
     def interface(self, name: str, what: str) -> Any:
         """Returns the class of a type; None, said once, where its package is not installed, which `what` needs."""
         try:
             return interface(name)
-        except NotInstalledError as error:
-            if (package := str(error)) not in self.missing:
+        except ImportError as error:
+            if (package := str(error.name)) not in self.missing:
                 how = f"`errand ros2 interfaces DIR --package {package}` writes it for colcon"
                 how = how if package in PACKAGES else "pip install 'errand-ros2[rclpy]' brings it"
                 if (distribution := os.environ.get("ROS_DISTRO")) and package != "errand_msgs":
@@ -129,31 +131,6 @@ class RclpySession(Session):
                     self.executor.spin()
                 except Exception as error:  # of rclpy itself, as for a message that cannot be taken
                     _LOG.warning("errand: rclpy (%s: %s)", type(error).__name__, error)
-
-
-def started(place: Place) -> Context:
-    """Returns a context of rclpy in a place's domain. Raises InputError when rclpy has no middleware."""
-    context = Context()
-    try:
-        rclpy.init(context=context, domain_id=place.domain, signal_handler_options=SignalHandlerOptions.NO)
-    except Exception as error:  # rclpy raises what its middleware raises
-        what = f"rclpy does not start ({str(error).partition(chr(10))[0][:120]})"
-        raise InputError(what, hint="source ROS 2 in this terminal, or write zenoh:") from error
-    return context
-
-
-@contextmanager
-def open_rclpy(place: Place) -> Iterator[RclpySession]:
-    """Opens a session. Raises InputError."""
-    with closing(RclpySession(place, started(place))) as session:
-        yield session
-
-
-class _Nobody(Client):
-    """Client of what needs an interface that is not installed."""
-
-    def call(self, request: Any, *, limit_s: float) -> Any: ...
-    def ask(self, request: Any, take: Callable[[Any], None], *, limit_s: float) -> None: ...
 
 
 class _RclpyClient(Client):
@@ -232,15 +209,11 @@ class _RclpyNode(Node):
         message_type = ros_types().message(type_name)
 
         def received(data: bytes, info: Mapping[str, int]) -> None:
-            took_s = 1e-9 * (time.time_ns() - info["source_timestamp"])
-            if late_s < math.inf and delays.of(b"", took_s) > late_s:
-                return
-            self.take(message_type, data, handle, name)
+            if delays.of(b"", 1e-9 * (time.time_ns() - info["source_timestamp"])) <= late_s:
+                self.take(message_type, data, handle, name)
 
-        subscription = self.inner.create_subscription(
-            kind, name, received, _profile(qos), callback_group=self.group, raw=True
-        )
-        end, executor = partial(self.inner.destroy_subscription, subscription), self.session.executor
+        made = self.inner.create_subscription(kind, name, received, _profile(qos), callback_group=self.group, raw=True)
+        end, executor = partial(self.inner.destroy_subscription, made), self.session.executor
         return lambda: executor.create_task(end) and None  # in its thread, which may be reading the subscription
 
     def serve(self, name: str, type_name: str, handle: Callable[[Request], None]) -> None:
@@ -263,7 +236,7 @@ class _RclpyNode(Node):
     def client(self, name: str, type_name: str) -> Client:
         name = self.absolute(name)
         service = self.session.interface(type_name, name)
-        return _Nobody() if service is None else _RclpyClient(self, name, service)
+        return Client() if service is None else _RclpyClient(self, name, service)
 
 
 def _profile(qos: Qos) -> QoSProfile:

@@ -22,8 +22,7 @@ _GID_BYTES: Final = 16
 _ATTACHMENT: Final = struct.Struct("<qqB16s")
 _NAME: Final = re.compile(r"/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 NODE, PUBLISHER, SUBSCRIPTION, SERVICE, CLIENT = "NN", "MP", "MS", "SS", "SC"  # kinds of entities in the graph of ROS 2
-INTERFACES: Final = Path(__file__).parents[1] / "interfaces"
-"""Folder of the interface files that rosbags lacks, as PACKAGE/KIND/NAME.KIND."""
+INTERFACES: Final = Path(__file__).parents[1] / "interfaces"  # what rosbags lacks, as PACKAGE/KIND/NAME.KIND
 _PARTS: Final = re.compile(r"^---$", re.MULTILINE)
 _EVENT: Final = "service_msgs/msg/ServiceEventInfo info\n{0}_Request[<=1] request\n{0}_Response[<=1] response"
 _SERVICE: Final = "{0}_Request request_message\n{0}_Response response_message\n{0}_Event event_message"

@@ -9,7 +9,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import partial
 from itertools import count
 from typing import Any, Final
 
@@ -18,7 +17,7 @@ from zenoh import ext
 
 from errand_ros2.wire import types
 from errand_ros2.wire.node import Client, Delays, Node, Place, Publisher, Request, Session, taken_by_others
-from errand_ros2.wire.types import USUAL, Attachment, MessageType, NodeKey, Qos, ServiceType, ros_types
+from errand_ros2.wire.types import USUAL, Attachment, NodeKey, Qos, ServiceType, ros_types
 from skills.inputs.errors import InputError
 
 _CDR: Final = "application/cdr"
@@ -154,8 +153,10 @@ class ZenohNode(Node):
         self.types[name] += [type_name, kind.key]
 
         def received(sample: zenoh.Sample) -> None:
-            if late_s < math.inf and _delay_s(sample, delays) > late_s:
-                return
+            with suppress(ValueError):  # one that does not tell when it was sent is not late
+                head = Attachment.decoded(sample.attachment.to_bytes() if sample.attachment else b"")
+                if delays.of(head.gid, 1e-9 * (time.time_ns() - head.stamp_ns)) > late_s:
+                    return
             self.take(kind, sample.payload.to_bytes(), handle, name)
 
         key, session = self.key.data_key(name, kind.key), self.session.inner
@@ -204,24 +205,16 @@ class ZenohNode(Node):
             if message is None:
                 with query:  # which ends the query without an answer
                     return
-            self.guarded(lambda: handle(Request(message, partial(_reply, kind.response, query, key, head))), name)
+
+            def reply(response: Any) -> None:
+                with query:
+                    attachment = Attachment(head.number, time.time_ns(), head.gid).encoded()
+                    query.reply(key, kind.response.encode(response), encoding=_CDR, attachment=attachment)
+
+            self.guarded(lambda: handle(Request(message, reply)), name)
 
         self._declared.append(self.session.inner.declare_queryable(key, asked, complete=True))
 
     def client(self, name: str, type_name: str) -> ZenohClient:
         """Returns a client of a service."""
         return ZenohClient(self, self.absolute(name), ros_types().service(type_name))
-
-
-def _reply(kind: MessageType, query: zenoh.Query, key: str, asked: Attachment, response: Any) -> None:
-    attachment = Attachment(asked.number, time.time_ns(), asked.gid).encoded()
-    with query:
-        query.reply(key, kind.encode(response), encoding=_CDR, attachment=attachment)
-
-
-def _delay_s(sample: zenoh.Sample, delays: Delays) -> float:
-    """Delay of a message (s); 0 for one that does not tell when it was sent."""
-    with suppress(ValueError):
-        head = Attachment.decoded(sample.attachment.to_bytes() if sample.attachment else b"")
-        return delays.of(head.gid, 1e-9 * (time.time_ns() - head.stamp_ns))
-    return 0.0

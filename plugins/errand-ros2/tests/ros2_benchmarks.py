@@ -3,6 +3,10 @@
 bridge: a run in the flat with one subscription to scan, tf and a picture for COUNT seconds: rates, pace, latency, CPU.
 cancel: COUNT goals of navigate_to_pose, each cancelled under way: time until the base stands.
 kill: a process that sends cmd_vel is killed COUNT times: time until the base of the served robot stands.
+faults: what a served robot and a run that drives it do when the client is killed, the link is cut or the robot stands
+    still for 4 s, the robot is killed, and a second one comes into the domain; over Zenoh (COUNT 0) or rclpy (1).
+stopped: what a subscriber hears that is stopped (SIGSTOP) for 4, 8 and 15 s while 10 events a second are published;
+    over Zenoh (COUNT 0) or rclpy (1).
 With the Python of `make ros`, two processes and a client with rclpy alone:
 rclpy: COUNT goals of navigate_to_pose of a run, each cancelled under way, and as many that are reached.
 bytes: COUNT random bytes to each input of a run and of a served robot: what moves, and what is said.
@@ -406,13 +410,160 @@ def fetch(count, first=1):
                 report = run(prepared, visitors=[Witness(plant)], control=Control(attended=False, pace=None)).report
         served.join(20.0)
         seen, spent_s = report.seen, time.monotonic() - begun_s
-        sys.stdout.write(f"seed {seed}: {report.outcome}, judged {seen.success}, {seen.collisions} collisions, ")
+        sys.stdout.write(f"seed {seed}: {report.outcome} ({report.message}), judged {seen.success}, ")
+        sys.stdout.write(f"{seen.collisions} collisions, ")
         sys.stdout.write(f"{seen.drops} drops, {report.sim_time_s:.0f} s in {spent_s:.0f} s; {seen.why}\n")
         sys.stdout.flush()
+
+
+def place_over(by_rclpy, number):
+    """A place over a wire, and how a command line names it."""
+    place = Place(DOMAIN + number, by_rclpy=True) if by_rclpy else free_place()
+    return place, f"rclpy:{place.domain}" if by_rclpy else f"zenoh:@127.0.0.1:{place.port}"
+
+
+def told(line):
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
+
+
+class Errand:
+    """A command of Errand in a process of its own, whose lines a file keeps."""
+
+    def __init__(self, folder, *words):
+        self.said = Path(tempfile.mkstemp(dir=folder)[1])
+        command = [sys.executable, "-m", "executive.cli", *words]
+        self.process = subprocess.Popen(command, stdout=self.said.open("w"), stderr=subprocess.STDOUT)
+
+    def says(self, words, limit_s=120.0):
+        from ros_client import soon
+
+        soon(lambda: words in self.said.read_text() or self.process.poll() is not None, limit_s)
+        assert words in self.said.read_text(), self.said.read_text()
+
+    def ended(self, limit_s=300.0):
+        """The exit code, and what was said at the end."""
+        code, lines = self.process.wait(limit_s), self.said.read_text().strip().splitlines()
+        return f"exit code {code}, {sum('Traceback' in line for line in lines)} tracebacks: {lines[-1][:150]}"
+
+
+def faults(by_rclpy):
+    from slow_link import SlowLink
+
+    (place, network), where = place_over(by_rclpy, 40), ("--world", "flat", "--start", *START)
+    with tempfile.TemporaryDirectory() as folder, open_session(place) as session:
+        watch, link = Watch(session), None if by_rclpy else SlowLink(place.port, most_s=0.0)
+
+        def drive(room, over=network):
+            options = ("--no-record", "--quiet", "--out", tempfile.mkdtemp(dir=folder))
+            run = Errand(
+                folder, "run", "--say", f"go to the {room}", *where, *options, "--robot", f"ros2://alice?network={over}"
+            )
+            watch.wait_for(0.3, 400.0)
+            assert watch.seen[-1][2] > 0.3, run.said.read_text()
+            return run
+
+        robot = Errand(folder, "serve-ros2", network, *where)
+        robot.says("ROS 2: /alice")
+        told(f"a second simulator: {Errand(folder, 'serve-ros2', network, *where).ended()}")
+        other = (
+            "run",
+            "--say",
+            "wait for an hour",
+            *where,
+            "--no-record",
+            "--quiet",
+            "--out",
+            folder,
+            "--ros2",
+            network,
+        )
+        told(f"a run beside it: {Errand(folder, *other).ended()}")
+        run = drive("bedroom")
+        now = time.monotonic(), watch.seen[-1][1]
+        run.process.kill()
+        time.sleep(2.0)
+        wall_s, robot_s = watch.still_after(*now)
+        told(f"client killed: the base stands after {robot_s:.2f} s of the robot's clock, {wall_s:.2f} s of the wall's")
+        run = drive("kitchen")
+        robot.process.send_signal(signal.SIGSTOP)
+        time.sleep(4.0)
+        robot.process.send_signal(signal.SIGCONT)
+        told(f"robot silent for 4 s: {run.ended()}")
+        if link is not None:
+            run = drive("bedroom", f"zenoh:@127.0.0.1:{link.port}")
+            now = time.monotonic(), watch.seen[-1][1]
+            with link.stall():
+                time.sleep(4.0)
+                wall_s, robot_s = watch.still_after(*now)
+            told(f"link cut for 4 s: the base stands after {robot_s:.2f} s of the robot's clock; {run.ended()}")
+        run, begun_s = drive("kitchen" if link is not None else "bedroom"), time.monotonic()
+        robot.process.kill()
+        told(f"robot killed: {run.ended()}; {time.monotonic() - begun_s:.0f} s")
+    (place, network), rows = place_over(by_rclpy, 41), []
+    with tempfile.TemporaryDirectory() as folder:
+        say = ("run", "--say", "wait for an hour", *where, "--no-record", "--quiet", "--ros2", network, "--out")
+        first = Errand(folder, *say, tempfile.mkdtemp(dir=folder))
+        first.says("ROS 2: ")
+        rows = [Errand(folder, *say, tempfile.mkdtemp(dir=folder)).ended() for _ in range(2)]
+        first.process.send_signal(signal.SIGINT)
+        told(f"two runs in one domain, the second and third: {rows}; the first: {first.ended()}")
+
+
+LISTENER = """
+import sys
+from errand_ros2.wire.node import Place, open_session
+
+with open_session(Place.parse(sys.argv[1])) as session:
+    hear = lambda event: print(event.data, flush=True)
+    session.node("listener").subscribe("/event", "std_msgs/msg/String", hear)
+    sys.stdin.read()
+"""
+"""Program that prints events until its input ends."""
+
+
+def stopped(by_rclpy):
+    from ros_client import soon
+
+    for still_s in (4.0, 8.0, 15.0):
+        (place, network), heard, at_s = place_over(by_rclpy, 45), {}, []
+        with open_session(place) as session:
+            events = session.node("sender").publisher("/event", "std_msgs/msg/String")
+
+            def send(seconds, events=events, at_s=at_s):
+                for _ in range(round(10 * seconds)):
+                    events.put({"data": str(len(at_s))})
+                    at_s.append(time.monotonic())
+                    time.sleep(0.1)
+
+            words, pipe = [sys.executable, "-c", LISTENER, network], subprocess.PIPE
+            with subprocess.Popen(words, stdin=pipe, stdout=pipe, text=True) as listener:
+
+                def read(listener=listener, heard=heard):
+                    for line in listener.stdout:
+                        heard[int(line)] = time.monotonic()
+
+                threading.Thread(target=read, daemon=True).start()
+                assert soon(lambda events=events: events.is_heard)
+                send(3.0)
+                before = len(at_s)
+                listener.send_signal(signal.SIGSTOP)
+                send(still_s)
+                listener.send_signal(signal.SIGCONT)
+                goes_on, again_s = len(at_s), time.monotonic()
+                send(12.0)
+                time.sleep(1.0)
+                listener.stdin.close()
+        lost = {*range(len(at_s))} - heard.keys()
+        first_s = min((each for each in heard.values() if each > again_s), default=math.inf) - again_s
+        parts = {"before": (0, before), "meanwhile": (before, goes_on), "after": (goes_on, len(at_s))}
+        counts = [f"{len(lost & {*range(*span)})} of {span[1] - span[0]} {when}" for when, span in parts.items()]
+        told(f"stopped for {still_s:.0f} s: lost {', '.join(counts)}; the first comes {first_s:.2f} s after it goes on")
 
 
 if __name__ == "__main__":
     what, *numbers = sys.argv[1:]
     measures = {"bridge": bridge, "cancel": cancel, "kill": kill, "listen": listen}
+    measures |= {"faults": faults, "stopped": stopped}
     measures |= {"rclpy": by_rclpy, "bytes": random_bytes, "base": base, "fetch": fetch}
     measures[what](*map(int, numbers or [60]))

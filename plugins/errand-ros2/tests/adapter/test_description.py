@@ -1,7 +1,5 @@
 """Descriptions of robots: the one of a served robot, those of the page, and what is refused with its line."""
 
-import re
-
 import pytest
 import yaml
 
@@ -9,8 +7,7 @@ from errand_ros2.adapter.description import RobotFile, load_description
 from skills.inputs.errors import InputError
 from tests.docs.documents import ROOT
 
-PAGE = (ROOT / "plugins/errand-ros2/docs/ros2.md").read_text()
-OF_THE_PAGE = [yaml.safe_load(each) for each in re.findall(r"```yaml\n(kind: .*?)```", PAGE, re.DOTALL)]
+RECIPES = ROOT / "plugins/errand-ros2/recipes"
 
 
 def test_a_served_spot_has_all_its_parts():
@@ -25,15 +22,13 @@ def test_a_served_fetch_has_its_head():
     assert load_description(None, "fetch").file.head.action == "head_controller/follow_joint_trajectory"
 
 
-def test_the_page_describes_three_robots_in_the_form_of_the_files():
-    assert [each["kind"] for each in OF_THE_PAGE] == ["turtlebot4", "stretch", "fetch"]
-    for each in OF_THE_PAGE:
-        RobotFile.model_validate(each)
+@pytest.mark.parametrize("kind", ["turtlebot4", "stretch", "fetch"])
+def test_a_recipe_has_the_form_of_a_description(kind):
+    assert RobotFile.model_validate(yaml.safe_load((RECIPES / f"{kind}.yaml").read_text())).kind == kind
 
 
-def test_fetch_of_the_page_fits_the_installed_kind(tmp_path):
-    (tmp_path / "robot.yaml").write_text(yaml.safe_dump(OF_THE_PAGE[2]))
-    description = load_description(tmp_path / "robot.yaml", "spot")
+def test_the_recipe_of_fetch_fits_the_installed_kind():
+    description = load_description(RECIPES / "fetch.yaml", "spot")
     assert description.file.joint_names["elbow_flex"] == "elbow_flex_joint"
     joints = description.capabilities.description
     assert all(f'name="{name}"' in joints for name in description.file.joint_names)

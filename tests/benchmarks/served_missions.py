@@ -13,9 +13,10 @@ from executive.app.prepare.from_request import prepare
 from executive.app.prepare.placed_robots import robot_stack
 from executive.app.runs.goal_conditions import verdict_of
 from executive.app.runs.one_run import run_request
-from executive.app.runs.real_robot import RealBackend
+from executive.app.runs.real_robot import RealBackend, real_runner
 from executive.app.runs.simulated import simulate
 from executive.mission.request import Request
+from executive.run.control import Control
 from executive.run.visitor import RunVisitor
 from skills.api import PICTURES, TOUCHES
 from skills.robot import ConnectedRobot
@@ -72,6 +73,13 @@ def run_served(request, lock_step, options=lambda _: {}):
     finally:
         made.clear()
         step.close()
+
+
+def run_real(prepared, address, plant):
+    """Returns the report of a run as by `errand run --robot`; `plant` has the referee behind the robot."""
+    with real_runner(prepared, address) as run:
+        run.keywords["backend"].judge = lambda *ended, **more: verdict_of(*ended, plant.referee.judge, **more)
+        return run(prepared, visitors=[Witness(plant)], control=Control(pace=None)).report
 
 
 def _ended(report, began_s):

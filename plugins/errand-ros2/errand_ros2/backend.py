@@ -14,7 +14,8 @@ from typing import Final
 from errand_ros2.adapter.clocks import RobotClock, SimulatedClock
 from errand_ros2.adapter.description import load_description
 from errand_ros2.adapter.robot import Ros2Robot
-from errand_ros2.wire.node import Place, open_session
+from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import topic_name
 from skills.inputs.errors import InputError
 from skills.robot import ConnectedRobot, RobotStoppedError

@@ -1,7 +1,4 @@
-"""Converts an event log to a ROS 2 bag (MCAP with CDR messages) that RViz, Foxglove and `ros2 bag` read.
-
-What has no usual message type becomes JSON. Times are those of the wall clock, if the log states when it began.
-"""
+"""Converts an event log to a ROS 2 bag (MCAP, CDR); what has no usual type becomes JSON. Times are the wall clock's."""
 
 from __future__ import annotations
 

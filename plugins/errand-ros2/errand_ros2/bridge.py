@@ -24,7 +24,8 @@ from errand_ros2.part_actions import PartActions
 from errand_ros2.readings import pose_on_map
 from errand_ros2.robot_topics import Frames, RobotTopics
 from errand_ros2.tree_topic import TreeTopic
-from errand_ros2.wire.node import Node, Place, Publisher, open_session
+from errand_ros2.wire.node import Node, Place, Publisher
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import LATCHED, Qos
 from executive.app.prepare.prepared import Prepared
 from executive.app.runs.backend import Observe

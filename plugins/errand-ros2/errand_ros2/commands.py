@@ -61,7 +61,8 @@ def serve_ros2(
     """Serves a simulated robot in ROS 2, without navigation, until Ctrl-C."""
     from errand_ros2.adapter.description import capabilities_of
     from errand_ros2.server import RobotServer
-    from errand_ros2.wire.node import Place, open_session
+    from errand_ros2.wire.node import Place
+    from errand_ros2.wire.session import open_session
     from errand_ros2.wire.types import topic_name
     from executive.app.prepare.placed_robots import only_robot, refuse_blocked
     from executive.app.prepare.worlds import open_world

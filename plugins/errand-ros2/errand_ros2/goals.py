@@ -1,7 +1,4 @@
-"""Goals from ROS 2 for one robot during a run, of the topic `goal_pose` and of actions.
-
-A goal becomes a mission that interrupts the present one, which goes on afterwards; a new goal replaces the one before.
-"""
+"""Goals from ROS 2 for one robot in a run: missions that interrupt the present one; a new one replaces it."""
 
 from __future__ import annotations
 

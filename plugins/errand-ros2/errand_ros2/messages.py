@@ -14,7 +14,6 @@ from pydrake.math import RigidTransform
 
 from errand_ros2.wire.types import ros_types
 from executive.record.event_log import plain_values
-from executive.words.schemas import pose_values
 from skills.api import FreeSpace
 from skills.footprint import clearance_on_grid
 from skills.grid_map import GridMap
@@ -50,14 +49,21 @@ def vector(values: Sequence[float]) -> Fields:
     return dict(zip("xyz", map(float, values), strict=True))
 
 
+def pose(X: RigidTransform) -> Fields:
+    """Returns a pose."""
+    turn = X.rotation().ToQuaternion()
+    orientation = {"x": turn.x(), "y": turn.y(), "z": turn.z(), "w": turn.w()}
+    return {"position": vector(X.translation()), "orientation": orientation}
+
+
 def pose_stamped(stamp_s: float, frame: str, X: RigidTransform) -> Fields:
     """Returns a pose in a frame."""
-    return {"header": header(stamp_s, frame), "pose": pose_values(X)}
+    return {"header": header(stamp_s, frame), "pose": pose(X)}
 
 
 def transform(stamp_s: float, parent: str, child: str, X: RigidTransform) -> Fields:
     """Returns the transform from a frame to its child."""
-    return moved(header(stamp_s, parent), child, pose_values(X))
+    return moved(header(stamp_s, parent), child, pose(X))
 
 
 def moved(head: Fields, child: str, at: Mapping[str, Any]) -> Fields:
@@ -75,7 +81,7 @@ def well_formed(urdf: str) -> str:
 
 def odometry(reading: Odometry, frame: str, body: str) -> Fields:
     """Returns the robot's dead reckoning; what it does not measure has a covariance so large that none counts it."""
-    at = {"pose": pose_values(reading.X_OB), "covariance": np.diag(_ODOMETRY_VARIANCES).ravel()}
+    at = {"pose": pose(reading.X_OB), "covariance": np.diag(_ODOMETRY_VARIANCES).ravel()}
     moving = {"twist": twist(reading.velocity), "covariance": np.diag(_VELOCITY_VARIANCES).ravel()}
     return {"header": header(reading.stamp_s, frame), "child_frame_id": body, "pose": at, "twist": moving}
 
@@ -84,7 +90,7 @@ def pose_with_covariance(stamp_s: float, X_WB: RigidTransform, covariance: Float
     """Returns an estimated pose on the map; the covariance (3, 3) is over x, y and yaw."""
     full = np.zeros((6, 6))
     full[np.ix_([0, 1, 5], [0, 1, 5])] = covariance
-    return {"header": header(stamp_s, MAP_FRAME), "pose": {"pose": pose_values(X_WB), "covariance": full.ravel()}}
+    return {"header": header(stamp_s, MAP_FRAME), "pose": {"pose": pose(X_WB), "covariance": full.ravel()}}
 
 
 def joint_state(reading: Joints) -> Fields:
@@ -231,7 +237,7 @@ def markers(stamp_s: float, seen: Iterable[tuple[str, Sequence[float]]]) -> Fiel
 
 def particles(stamp_s: float, poses: FloatArray) -> Fields:
     """Returns poses (N, 3) of equal weight as nav2_msgs/ParticleCloud."""
-    every = [{"pose": pose_values(Pose2D(*row).transform()), "weight": 1.0 / len(poses)} for row in poses.tolist()]
+    every = [{"pose": pose(Pose2D(*row).transform()), "weight": 1.0 / len(poses)} for row in poses.tolist()]
     return {"header": header(stamp_s, MAP_FRAME), "particles": every}
 
 

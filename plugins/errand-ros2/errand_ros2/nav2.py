@@ -14,8 +14,9 @@ import numpy as np
 
 from errand_ros2.messages import MAP_FRAME, Fields, pose_stamped
 from errand_ros2.readings import planar_pose
-from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError, SentGoal
-from errand_ros2.wire.node import Place, Publisher, open_session
+from errand_ros2.wire.actions import ActionClient, GoalStatus, SentGoal
+from errand_ros2.wire.node import Place, Publisher
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import ros_types
 from skills.api import Cause, FreeSpace, PlanningError
 from skills.footprint import Footprint, footprint_clearance_m, pose_array
@@ -87,7 +88,7 @@ class Nav2:
             client = ActionClient(session.node("errand_planner"), self.action, _PLAN)
             try:
                 sent = client.send(asked, limit_s=self.limit_s)
-            except NoAnswerError as error:
+            except TimeoutError as error:
                 raise PlanningError(f"no Nav2 is active on {self.action} of the stack file ({session.told})") from error
             if sent is None or not sent.ended.wait(self.limit_s):
                 raise PlanningError(f"Nav2 on {self.action} does not plan within {self.limit_s:g} s")
@@ -132,13 +133,10 @@ class Nav2Drive(FollowerOptions):
 
 
 class _Trip:
-    """Goal of Nav2, sent and cancelled by a thread of its own, since a tick waits for nobody.
-
-    `left_m` is the distance by the last of `heard` feedback messages. Set `over` to cancel the goal, or once it ended.
-    """
+    """Goal of Nav2 in a thread of its own, since a tick waits for nobody. Set `over` to cancel it, or once it ended."""
 
     def __init__(self, options: Nav2Drive, poses: Sequence[Fields]) -> None:
-        self.left_m, self.heard, self.over = 0.0, 0, threading.Event()
+        self.left_m, self.heard, self.over = 0.0, 0, threading.Event()  # distance by the last of the messages heard
         self.sent: SentGoal | None = None
         self.failure: SkillFailure | None = None
         self._limit: Publisher | None = None
@@ -178,7 +176,7 @@ class _Trip:
 
 
 def _sent(client: ActionClient, options: Nav2Drive, poses: Sequence[Fields]) -> SentGoal | None:
-    """Sends the poses, or the last of them, as a goal; None when Nav2 rejects it. Raises NoAnswerError."""
+    """Sends the poses, or the last of them, as a goal; None when Nav2 rejects it. Raises TimeoutError."""
     tree = {"behavior_tree": options.behavior_tree}
     if not options.through_m:
         return client.send({"pose": poses[-1], **tree}, limit_s=options.limit_s)

@@ -35,19 +35,18 @@ import numpy as np
 
 from errand_ros2.bridge import Bridge
 from errand_ros2.server import RobotServer
-from errand_ros2.wire.node import Place, open_session
+from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import Attachment, ros_types
 from executive import Request
 from executive.app.prepare.from_request import prepare
 from executive.app.prepare.placed_robots import only_robot
 from executive.app.prepare.worlds import open_world
-from executive.app.runs.goal_conditions import verdict_of
 from executive.app.runs.one_run import run_request
-from executive.app.runs.real_robot import real_runner
 from executive.app.runs.simulated import compile_first, simulate
 from executive.run.control import Control
 from skills.robot import Pose2D
-from tests.benchmarks.served_missions import MISSIONS, Witness
+from tests.benchmarks.served_missions import MISSIONS, run_real
 
 HEARD = {"/alice/scan": "sensor_msgs/msg/LaserScan", "/tf": "tf2_msgs/msg/TFMessage"}
 HEARD |= {"/alice/frontleft/image": "sensor_msgs/msg/Image", "/clock": "rosgraph_msgs/msg/Clock"}
@@ -403,11 +402,7 @@ def fetch(count, first=1):
             asked = {"file": MISSIONS / "fetch_drink.yaml", "world": "flat", "start": Pose2D(*map(float, START))}
             prepared = prepare(Request(**asked, seed=seed, out=Path(folder) / "out", record=False))
             begun_s, plant = time.monotonic(), Asked(ours)
-            with real_runner(prepared, f"ros2://alice?network=rclpy:{domain}") as run:
-                run.keywords["backend"].judge = lambda tree, result, plant=plant, **more: verdict_of(
-                    tree, result, plant.judge, **more
-                )
-                report = run(prepared, visitors=[Witness(plant)], control=Control(attended=False, pace=None)).report
+            report = run_real(prepared, f"ros2://alice?network=rclpy:{domain}", plant)
         served.join(20.0)
         seen, spent_s = report.seen, time.monotonic() - begun_s
         sys.stdout.write(f"seed {seed}: {report.outcome} ({report.message}), judged {seen.success}, ")
@@ -512,7 +507,8 @@ def faults(by_rclpy):
 
 LISTENER = """
 import sys
-from errand_ros2.wire.node import Place, open_session
+from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 
 with open_session(Place.parse(sys.argv[1])) as session:
     hear = lambda event: print(event.data, flush=True)

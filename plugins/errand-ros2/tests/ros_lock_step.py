@@ -11,7 +11,8 @@ from errand_ros2.adapter.clocks import RobotClock
 from errand_ros2.adapter.description import described, served_file
 from errand_ros2.adapter.robot import Ros2Robot
 from errand_ros2.server import PERIOD_S, RobotServer
-from errand_ros2.wire.node import Publisher, open_session
+from errand_ros2.wire.node import Publisher
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.zenoh_node import ZenohClient
 from plant.robots.spot.kind import spot_capabilities
 from skills.testing.blocks import Block

@@ -18,7 +18,8 @@ from ros_client import free_port, soon
 from ros_lock_step import restore, state_of
 
 from errand_ros2.bridge import Bridge
-from errand_ros2.wire.node import Place, open_session
+from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import ros_types
 from executive import Request
 from executive.app.prepare.from_request import prepare

@@ -13,7 +13,8 @@ from ros_client import soon
 from ros_run import ACTIONS, POSE, STRING, TRIGGER, TWIST, ActionClient, run_of_alice, stamped, twist
 
 from errand_ros2.wire.actions import GoalStatus
-from errand_ros2.wire.node import Place, open_session
+from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import Attachment, ros_types, service_forms
 from skills.navigate.follower import FollowerOptions
 

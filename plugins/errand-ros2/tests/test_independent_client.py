@@ -21,7 +21,7 @@ from zenoh_ros2_sdk import ROS2Publisher, ROS2ServiceClient, ROS2Subscriber
 from zenoh_ros2_sdk.discovery import get_service_names_and_types, get_topic_info, get_topic_names_and_types
 
 from errand_ros2.wire.actions import GoalStatus
-from errand_ros2.wire.node import open_session
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import LATCHED
 from tests.tables import yaml_beside
 

@@ -14,7 +14,8 @@ from ros_client import free_port
 from errand_ros2 import messages
 from errand_ros2.nav2 import Nav2
 from errand_ros2.wire.actions import ActionServer, GoalStatus
-from errand_ros2.wire.node import Place, open_session
+from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 from executive.testing.bench import SkillBench
 from executive.tree.registry import installed_skills
 from plant.robots.spot.kind import spot_capabilities

@@ -19,7 +19,8 @@ from scripted_nav2 import THROUGH, TO_POSE, ScriptedNav2
 from wire.test_node import RCLPY
 
 from errand_ros2.nav2 import Nav2Drive, Nav2Follower, failure_of
-from errand_ros2.wire.node import Place, open_session
+from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 from executive.testing.bench import SkillBench
 from executive.tree.registry import installed_skills
 from plant.robots.spot.kind import spot_capabilities

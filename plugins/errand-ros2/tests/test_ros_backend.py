@@ -13,7 +13,8 @@ from ros_client import free_port
 from errand_ros2 import backend
 from errand_ros2.backend import Ros2
 from errand_ros2.server import RobotServer
-from errand_ros2.wire.node import Place, open_session
+from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 from plant.robots.spot.kind import spot_capabilities
 from skills.inputs.errors import InputError
 from skills.robot import CommandState, RobotStoppedError

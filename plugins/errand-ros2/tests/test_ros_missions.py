@@ -15,7 +15,7 @@ from scripted_nav2 import THROUGH, TO_POSE, by_nav2
 
 from errand_ros2.part_actions import GRIPPER, TRAJECTORY
 from errand_ros2.wire.actions import GoalStatus
-from errand_ros2.wire.node import open_session
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import ros_types
 from executive import Request
 from executive.run.control import Control

@@ -24,7 +24,8 @@ from errand_ros2 import messages
 from errand_ros2.part_actions import TRAJECTORY
 from errand_ros2.server import RobotServer
 from errand_ros2.wire import actions
-from errand_ros2.wire.node import Place, open_session
+from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import LATCHED, ros_types
 from plant.robots.spot.kind import spot_capabilities
 from skills.grid_map import GridMap

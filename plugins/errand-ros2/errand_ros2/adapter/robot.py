@@ -14,9 +14,8 @@ from errand_ros2.adapter.description import DRIVE_EXPIRY_S, Description
 from errand_ros2.adapter.sensors import OLD_STATE_S, SensedRobot
 from errand_ros2.part_actions import GRIPPER, INVALID_GOAL, TRAJECTORY
 from errand_ros2.readings import within_limits
-from errand_ros2.wire.actions import ActionClient, GoalStatus, NoAnswerError
+from errand_ros2.wire.actions import ActionClient, GoalStatus
 from errand_ros2.wire.node import Node
-from executive.words.schemas import pose_values
 from skills.command_table import CommandTable, LeaseManager, refusal_of
 from skills.robot import ArmTrajectory, BaseKind, CommandCause, CommandId, CommandState, Lease
 
@@ -75,7 +74,7 @@ class Ros2Robot(SensedRobot):
         if not (low <= height_m <= high and least <= pitch_rad <= most):
             return self._commands.refuse(f"stand: {height_m:.2f} m, {pitch_rad:.2f} rad is out of range")
         X = RigidTransform(RotationMatrix.MakeYRotation(pitch_rad), [0.0, 0.0, height_m - can.standing_height_m])
-        self._posture.put(pose_values(X))
+        self._posture.put(messages.pose(X))
         return self._commands.begin(POSTURE, (height_m, pitch_rad), self._clock.now(), until_s)
 
     def sit(self, *_: Any, **__: Any) -> CommandId:
@@ -89,8 +88,7 @@ class Ros2Robot(SensedRobot):
         arm = self._description.capabilities.arm
         if arm is None or trajectory.positions_rad.shape[1] != len(arm.joint_names):
             return self.sit() if arm is None else self._commands.refuse("move_arm: wrong joints")
-        goal = self._trajectory(arm.joint_names, trajectory)
-        return self._act(ARM, goal, until_s, lease, trajectory.times_s)
+        return self._act(ARM, self._trajectory(arm.joint_names, trajectory), until_s, lease, trajectory.times_s)
 
     def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
         """Sends pan and tilt to the head's controller; done by its result."""
@@ -240,7 +238,7 @@ class Ros2Robot(SensedRobot):
             return refused
         try:
             sent = self.actions[part].send(goal, limit_s=_CALL_S)
-        except NoAnswerError as error:
+        except TimeoutError as error:
             return self._commands.refuse(f"{part}: {error}", CommandCause.NO_ANSWER)
         if sent is None:
             return self._commands.refuse(f"{part}: the controller rejects the goal", CommandCause.REFUSED)

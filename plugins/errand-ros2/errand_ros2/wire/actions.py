@@ -140,10 +140,6 @@ class ActionServer:
         return ros_types().make(f"{self.kind}_Result", **fields)
 
 
-class NoAnswerError(RuntimeError):
-    """Error of a server that does not answer in time: the goal may be pursued."""
-
-
 @dataclass
 class SentGoal:
     """Goal that a server accepted; status and result are set when it ends, by a thread of the wire."""
@@ -164,12 +160,15 @@ class ActionClient:
         self._result = node.client(f"{base}/get_result", f"{type_name}_GetResult")
 
     def send(self, goal: Any, *, limit_s: float) -> SentGoal | None:
-        """Sends a goal or its fields; returns None when the server rejects it. Raises NoAnswerError."""
+        """Sends a goal or its fields; returns None when the server rejects it.
+
+        Raises TimeoutError when no answer comes: the goal may be pursued.
+        """
         sent = SentGoal({"uuid": np.frombuffer(uuid.uuid4().bytes, np.uint8)})
         answer = self._send.call({"goal_id": sent.identity, "goal": goal}, limit_s=limit_s)
         if answer is None:
             self.cancel(sent)
-            raise NoAnswerError("the action's server does not answer")
+            raise TimeoutError("the action's server does not answer")
         if not answer.accepted:
             return None
 

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections import defaultdict
 from collections.abc import Callable
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager, closing, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any, Final, cast
@@ -68,20 +68,6 @@ class Session(ABC):
         """Returns a new node. Raises InputError for a namespace that ROS 2 does not allow."""
 
 
-def open_session(place: Place) -> AbstractContextManager[Session]:
-    """Opens a session over the wire that a place names. Raises InputError."""
-    if not place.by_rclpy:
-        from errand_ros2.wire.zenoh_node import open_zenoh
-
-        return open_zenoh(place)
-    try:
-        from errand_ros2.wire.rclpy_node import RclpySession
-    except ImportError as error:  # such as that of a ROS 2 for another Python
-        what = f"this Python cannot load rclpy ({str(error).partition(chr(10))[0][:120]})"
-        raise InputError(what, hint="run Errand with the Python of that ROS 2, or write zenoh:") from error
-    return closing(RclpySession(place))
-
-
 class Publisher:
     """Publisher of one topic. Late subscribers get the last messages if its quality of service says so."""
 
@@ -118,10 +104,7 @@ class Request:
 
 
 class Node(ABC):
-    """Node in the graph of ROS 2. Names that begin with `/` are absolute, others stand below its namespace.
-
-    Handlers are called in threads of the wire.
-    """
+    """Node of ROS 2, whose handlers threads of the wire call. Names without a `/` before stand below its namespace."""
 
     padding = 0  # bytes that the wire may add to a message
 

@@ -154,11 +154,8 @@ class _RclpyClient(Client):
             self._ask(request, take)
 
     def _ask(self, request: Any, take: Callable[[Any], Any]) -> None:
-        def taken(future: Future[Any]) -> None:
-            if (response := future.result()) is not None:
-                take(response)
-
-        self._client.call_async(filled(self._request, request)).add_done_callback(taken)
+        asked = self._client.call_async(filled(self._request, request))
+        asked.add_done_callback(lambda future: None if future.result() is None else take(future.result()))
 
 
 class _RclpyNode(Node):

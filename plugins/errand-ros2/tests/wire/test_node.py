@@ -21,7 +21,8 @@ from ros_client import EMPTY, connected, free_port, soon
 from zenoh_ros2_sdk import ROS2ServiceClient, ROS2Subscriber
 
 from errand_ros2.wire.actions import ActionClient, ActionServer, GoalStatus
-from errand_ros2.wire.node import Place, open_session
+from errand_ros2.wire.node import Place
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import LATCHED, SENSOR, MalformedError, ros_types
 from skills.inputs.errors import InputError
 
@@ -329,10 +330,3 @@ def test_the_usual_domain_is_that_of_the_environment(monkeypatch):
     monkeypatch.setenv("ROS_DOMAIN_ID", "many")
     with pytest.raises(InputError, match="'many' is no ROS domain"):
         Place.parse("")
-
-
-def test_an_rclpy_for_another_python_is_an_error_that_says_what_to_do(monkeypatch):
-    monkeypatch.setitem(sys.modules, "errand_ros2.wire.rclpy_node", None)
-    with pytest.raises(InputError, match="this Python cannot load rclpy") as raised:
-        open_session(Place(by_rclpy=True))
-    assert raised.value.hint == "run Errand with the Python of that ROS 2, or write zenoh:"

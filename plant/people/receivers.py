@@ -276,10 +276,10 @@ class Receiver(Stateful, saved=("phase", "offer", "_since_s", "_opening", "_p_HO
             self._enter(Phase.PULLING, now_s)
 
     def _end_receiving(self, offer: Offer, now_s: float) -> None:
-        """Pulls again when the gripper still holds the object; hides the tray when the object is not on it."""
+        """Brings the tray below an object that the gripper still holds; hides it when the object is not on it."""
         if self._offers.grips(offer) and self._offers.holds(offer):
             self._grip(offer)
-            self._enter(Phase.PULLING, now_s)
+            self._enter(Phase.BRINGING, now_s)
         elif not self._on_tray(offer):
             self._go_home(now_s)
 

@@ -110,17 +110,19 @@ class ArmSkill(RoutineSkill[InputsT]):
         self._rng = np.random.default_rng(self.context.seed)
 
     def trouble(self) -> SkillFailure | None:
-        """Returns a failure when the watched object is lost; grips the object more firmly when it starts to slip."""
-        if self._watch is None:
-            return None
-        context = self.context
-        grip = self._watch.judge(context.robot.gripper(), context.clock.now())
-        if grip is Grip.SLIPPING:
-            self.issue(grip_again(context.robot, self._watch.force_n, clock=context.clock, lease=context.lease))
-        if grip is not Grip.LOST:
+        """Returns a failure when the watched object is lost."""
+        if self._watch is None or self.grip_by(self._watch) is not Grip.LOST:
             return None
         self._watch = None
         return SkillFailure(Cause.POSTCONDITION, self.lost_message)
+
+    def grip_by(self, watch: HoldWatch) -> Grip:
+        """Judges the grip; grips the object more firmly when it starts to slip."""
+        context = self.context
+        grip = watch.judge(context.robot.gripper(), context.clock.now())
+        if grip is Grip.SLIPPING:
+            self.issue(grip_again(context.robot, watch.force_n, clock=context.clock, lease=context.lease))
+        return grip
 
     @property
     def model(self) -> ArmModel:

@@ -8,6 +8,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, InputsT, Surface
+from skills.geometry import inside_polygon
 from skills.manipulation.arm.collision import Box
 from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints, towards_shoulder
 from skills.manipulation.arm.releasing_skill import ReleasingSkill
@@ -43,6 +44,8 @@ _FELL_WITHIN_M = 1.0
 """Level distance from the release point within which a fallen object is looked for."""
 _PLATE_M = 0.2
 """Half side of the square around the object for the search of a plate below it."""
+_PLATE_OFF_M, _LEVEL_M = 0.04, 0.01
+"""Uncertainty of the height of such a plate, and the precision of the search."""
 _MOVES_ABOUT_M = 0.25
 """Radius around the object in which motion is looked for."""
 _SAME_PLACE_M = 0.015
@@ -129,7 +132,7 @@ def judge_release(
 
     The object counts as given in three cases: a detection of its class lies near the release point, points there are as
     high as its upper half was, or an object lies there on a level plate. Without `names`, every class except people
-    matches.
+    matches, and the plate may be lower.
     """
     own = [each for each in found if (each.class_name in names if names else each.class_name != PERSON)]
     own.sort(key=lambda each: _off_m(each, release))
@@ -137,7 +140,7 @@ def judge_release(
     for each in own:
         if _off_m(each, release) < _TAKEN_WITHIN_M and each.position_W[2] > lowest_m:
             return Sight(Seen.GIVEN, each.position_W, detected=True)
-    if stands_at(image, X_WO, release) or lies_at(image, X_WO, release):
+    if stands_at(image, X_WO, release) or lies_at(image, X_WO, release, release.low_m if names else lowest_m):
         return Sight(Seen.GIVEN, release.p_W)
     for each in own:
         if _off_m(each, release) < _FELL_WITHIN_M and each.position_W[2] <= _FALLEN_M:
@@ -155,11 +158,14 @@ def _off_m(found: Detection3D, release: Release) -> float:
     return float(np.hypot(found.position_W[0] - release.x_m, found.position_W[1] - release.y_m))
 
 
-def lies_at(image: Image, X_WO: RigidTransform, release: Release) -> bool:
-    """Returns whether a picture shows an object on a level plate at about the height of the release."""
+def lies_at(image: Image, X_WO: RigidTransform, release: Release, lowest_m: float) -> bool:
+    """Returns whether a picture shows an object on a level plate, at a height from lowest_m to that of the release."""
     corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
     square = tuple((release.x_m + _PLATE_M * x, release.y_m + _PLATE_M * y) for x, y in corners)
-    view = segment_surface(image, X_WO, Surface("plate", square, release.low_m))
+    levels_m = np.arange(lowest_m - _PLATE_OFF_M, release.low_m + _PLATE_OFF_M, _LEVEL_M)
+    p_W = cloud_from_image(image, X_WO, heights_m=(levels_m[0], levels_m[-1])).p_W
+    counts, _ = np.histogram(p_W[inside_polygon(p_W[:, :2], square, 0.0), 2], bins=levels_m)
+    view = segment_surface(image, X_WO, Surface("plate", square, float(levels_m[np.argmax(counts)])))
     if view is None:
         return False
     middles = [np.median(cluster.points.p_W[:, :2], axis=0) for cluster in view.clusters]

@@ -183,10 +183,24 @@ def test_depth_shows_a_tall_object_whatever_its_class(things, stands):
 TRAY, FLAT_RELEASE = Can(1.05, 0.0, 0.18, 0.01, GREY, base=0.92), Release(1.05, 0.0, 0.95, 0.97)
 
 
-# What is on a plate 2 cm below where a flat object was let go of -> whether something lies there
-@pytest.mark.parametrize(("things", "lies"), [((Can(1.05, 0.0, 0.04, 0.025, GREY, base=0.93),), True), ((), False)])
-def test_depth_shows_a_flat_object_on_a_level_plate(things, lies):
-    assert lies_at(scene((TRAY, *things)), RigidTransform(), FLAT_RELEASE) is lies
+FLAT, MUG = Can(1.05, 0.0, 0.04, 0.025, GREY, base=0.93), Can(1.09, 0.03, 0.04, 0.095, BLUE, base=0.82)
+
+
+# What is on a tray whose top is at a height, down to which the search goes -> whether something lies there
+@pytest.mark.parametrize(
+    ("things", "top_m", "lowest_m", "lies"),
+    [((FLAT,), 0.93, 0.95, True), ((), 0.93, 0.95, False), ((MUG,), 0.82, 0.80, True), ((), 0.82, 0.80, False)],
+)
+def test_depth_shows_an_object_on_a_level_plate(things, top_m, lowest_m, lies):
+    tray = replace(TRAY, base=top_m - TRAY.height)
+    assert lies_at(scene((tray, *things)), RigidTransform(), FLAT_RELEASE, lowest_m) is lies
+
+
+# Classes of the detector that the name has -> result for an object on a tray 13 cm below the release
+@pytest.mark.parametrize(("names", "seen"), [((), Seen.GIVEN), (("coke",), Seen.NOT_SEEN)])
+def test_an_own_object_that_fell_onto_the_tray_is_given(names, seen):
+    image = scene((replace(TRAY, base=0.81), MUG))
+    assert judge_release(image, RigidTransform(), [], names, FLAT_RELEASE).seen is seen
 
 
 def test_depth_cannot_separate_a_flat_object_from_its_support():

@@ -100,7 +100,7 @@ def test_an_object_that_falls_on_the_way_is_picked_up_and_brought():
     noticed_s = next(t["t"] for t in mission.transitions if "lost on the way" in t["message"])
     assert noticed_s - robot.lost_s <= 0.3
     told = [t["message"] for t in mission.transitions]
-    assert "the beer fell on the way to the start; it is picked up again" in told
+    assert "the beer has left the gripper on the way to the start; it is looked for" in told
 
 
 @pytest.mark.nightly

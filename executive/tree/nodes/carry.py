@@ -220,8 +220,8 @@ class Fallen(ExplainedLeaf):
         slipped = self.context.robot.gripper().holding
         if slipped:
             self._write(towards, self.set_down_ahead_m)
-        happened = "slips in the gripper" if slipped else "fell"
-        then = "is set down and gripped again" if slipped else "is picked up again"
+        happened = "slips in the gripper" if slipped else "has left the gripper"
+        then = "is set down and gripped again" if slipped else "is looked for"
         return self.say(f"the {self.item} {happened} on the way {self.to}; it {then}")
 
     def _write(self, pose: Pose2D, ahead_m: float) -> None:
@@ -349,14 +349,14 @@ def _look_plan(builder: PlanBuilder, item: ObjectKind, keys: dict[str, str]) -> 
     knows_spot = builder.has_ports("detect", ("expected_W",))
     spot = [detect_plan(builder.at("spot"), item, floor, detection, {"expected_W": FromBoard(keys["spot"])})]
     return builder.first_of(
-        f"find the {item} where it fell",
+        f"find the {item} where it was lost",
         *(spot if knows_spot else []),
         detect_plan(builder, item, floor, detection),
         _near_plan(builder.at("near"), item, detection),
         *aside,
         part="find",
         exhausted_cause=Cause.POSTCONDITION,
-        exhausted_message=f"the {item} is not found again where it fell",
+        exhausted_message=f"the {item} is not found again where it was lost",
     )
 
 

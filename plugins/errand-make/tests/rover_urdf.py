@@ -73,9 +73,9 @@ def head():
     )
 
 
-def urdf(*, with_arm=True, with_gripper=True, with_head=False):
-    """The robot's URDF text; without a head its camera is fixed to the mast."""
-    fixed = joint("camera_mount", "fixed", "mast", "camera_link", "0.05 0 0.9", "0 0.6 0")
+def urdf(*, with_arm=True, with_gripper=True, with_head=False, eye=(0.9, 0.6)):
+    """The robot's URDF text; without a head its camera is fixed to the mast: `eye` has its height and tilt there."""
+    fixed = joint("camera_mount", "fixed", "mast", "camera_link", f"0.05 0 {eye[0]}", f"0 {eye[1]} 0")
     wheel = '<cylinder radius="0.08" length="0.03"/>'
     parts = [
         link("base_link", 40, mesh("base.stl"), "0 0 0.12", size=0.4),

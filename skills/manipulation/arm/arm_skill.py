@@ -78,7 +78,7 @@ class ArmSkill(RoutineSkill[InputsT]):
     the loss of the held object fails the skill with `lost_message`.
     """
 
-    lost_message: ClassVar[str] = "the object was lost"
+    lost_message: ClassVar[str] = "the {thing} was lost"
 
     def __init__(self, context: SkillContext) -> None:
         super().__init__(context)
@@ -114,7 +114,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         if self._watch is None or self.grip_by(self._watch) is not Grip.LOST:
             return None
         self._watch = None
-        return SkillFailure(Cause.POSTCONDITION, self.lost_message)
+        return SkillFailure(Cause.POSTCONDITION, self.lost_message.format(thing=self.thing))
 
     def grip_by(self, watch: HoldWatch) -> Grip:
         """Judges the grip; grips the object more firmly when it starts to slip."""
@@ -149,6 +149,11 @@ class ArmSkill(RoutineSkill[InputsT]):
         if gripper is None:
             raise SkillFailure(Cause.PRECONDITION, "the robot has no gripper")
         return gripper
+
+    @property
+    def thing(self) -> str:
+        """Name of the held object, as far as it is known."""
+        return str(self.context.payload.kind or "object")
 
     @property
     def p_HT(self) -> FloatArray:

@@ -122,7 +122,7 @@ class Grasp(CloseLookingSkill[GraspInputs]):
     gripper_after = True
     Options: ClassVar[type] = GraspOptions
     options: GraspOptions
-    lost_message = "the object fell out of the gripper while it was lifted"
+    lost_message = "the {thing} slipped out of the grip while it was lifted"
 
     def begin(self, inputs: GraspInputs) -> None:
         """Resets the state of an earlier attempt, and starts from the grasps that `inputs` names."""

@@ -93,7 +93,7 @@ class HandOver(HandOverVerification[HandOverInputs]):
     Options: ClassVar[type] = HandOverOptions
     options: HandOverOptions
 
-    lost_message = "the object was lost before it was held out"
+    lost_message = "the {thing} was lost before it was held out"
 
     def begin(self, inputs: HandOverInputs) -> None:
         """Resets the state of an earlier attempt."""
@@ -248,11 +248,11 @@ class HandOver(HandOverVerification[HandOverInputs]):
     def _check(self, person: SeenPerson, name: str) -> None:
         """Raises SkillFailure unless the object is held near the person."""
         if not self.context.robot.gripper().holding:
-            raise SkillFailure(Cause.POSTCONDITION, f"the object was lost while it was held out to {name}")
+            raise SkillFailure(Cause.POSTCONDITION, f"the {self.thing} was lost while it was held out to {name}")
         p_BT = self.model.X_BH(self.q_rad()) @ self.p_HT
         off = float(np.linalg.norm(p_BT[:2] - self._ahead(person)))
         if off > self.options.furthest_m:
-            raise SkillFailure(Cause.EXECUTION, f"the object is held {off:.2f} m from {name}, which is too far")
+            raise SkillFailure(Cause.EXECUTION, f"the {self.thing} is held {off:.2f} m from {name}, which is too far")
 
     def _ahead(self, person: SeenPerson) -> FloatArray:
         """Position (x, y) of the person's axis in the body frame."""

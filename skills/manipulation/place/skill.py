@@ -135,7 +135,7 @@ class Place(BinPlacement[PlaceInputs]):
 
     def undone(self, inputs: PlaceInputs) -> str | None:
         """Returns a reason when the object is still in the gripper."""
-        return "the object is still in the gripper" if self.context.robot.gripper().holding else None
+        return f"the {self.thing} is still in the gripper" if self.context.robot.gripper().holding else None
 
     def run(self, inputs: PlaceInputs) -> Routine[Succeeded]:
         """Drives near, views the surface, puts the object down, and checks."""
@@ -154,7 +154,7 @@ class Place(BinPlacement[PlaceInputs]):
             yield from self.stand_as_usual()
             raise
         yield from self.stand_as_usual()
-        return Succeeded(f"put the object {'in' if surface.is_bin else 'down on'} the {surface.name}")
+        return Succeeded(f"put the {self.thing} {'in' if surface.is_bin else 'down on'} the {surface.name}")
 
     def _put_down(self, search: SpotSearch, carried: RotationMatrix) -> Routine[None]:
         """Finds a spot, lowers and releases the object, checks, and stows the arm."""
@@ -163,7 +163,7 @@ class Place(BinPlacement[PlaceInputs]):
         spot_W = np.asarray((self.X_WB() @ self.model.X_BH(self.q_rad()) @ held.p_HO)[:2])
         kind = self.context.payload.kind
         self.checkpoint = {**self.checkpoint, "spot_W": spot_W.tolist(), "kind": None if kind is None else kind.name}
-        held_kg = yield from self.weigh(self.p_HT, f"weighing the object over the {surface.name}")
+        held_kg = yield from self.weigh(self.p_HT, f"weighing the {self.thing} over the {surface.name}")
         self.context.expect_touch(_TOUCH_S)
         yield from self._lower(surface, above, held)
         put_down = held.box(self.model.X_BH(self.q_rad()))
@@ -181,10 +181,10 @@ class Place(BinPlacement[PlaceInputs]):
         over_spot = spot_W is not None and self.is_hand_near(spot_W, _OVER_SPOT_M)
         if self.context.robot.gripper().holding:
             if over_spot:
-                yield from self.try_shift_hand(_LIFT_AGAIN_M * UP_B, "lifting the object again")
+                yield from self.try_shift_hand(_LIFT_AGAIN_M * UP_B, f"lifting the {self.thing} again")
             return (yield from self.run(inputs))
         if spot_W is None:
-            raise SkillFailure(Cause.PRECONDITION, "the object left the gripper before it was over its place")
+            raise SkillFailure(Cause.PRECONDITION, f"the {self.thing} left the gripper before it was over its place")
         self.checkpoint = {"released_W": spot_W.tolist(), **self.checkpoint}
         if over_spot:
             yield from self.let_go(None)
@@ -194,13 +194,13 @@ class Place(BinPlacement[PlaceInputs]):
             yield from self.check(surface, spot_W[:2], within_m=self.options.seen_again_m)
         yield from self.stow()
         yield from self.stand_as_usual()
-        return Succeeded(f"the object was {'in' if surface.is_bin else 'on'} the {surface.name} already")
+        return Succeeded(f"the {self.thing} was {'in' if surface.is_bin else 'on'} the {surface.name} already")
 
     def _carried(self) -> RotationMatrix:
         """Rotation of the hand while it carried the object, from the checkpoint of an interrupted attempt."""
         noted = self.checkpoint.get("carried")
         rotation = self.model.X_BH(self.q_rad()).rotation() if noted is None else RotationMatrix(np.array(noted))
-        self.checkpoint = {**self.checkpoint, "carried": rotation.matrix().tolist()}
+        self.checkpoint = {**self.checkpoint, "carried": rotation.matrix().tolist(), "thing": self.thing}
         return rotation
 
     def _find_spot(self, search: SpotSearch, carried: RotationMatrix) -> Routine[PrePlacePose]:
@@ -211,7 +211,7 @@ class Place(BinPlacement[PlaceInputs]):
             yield from self.stand_at(heights_m[0], standing)
             if self._tucked():  # a head camera sees past an object ahead of the body
                 self.boxes = surface_boxes([surface], self.X_WB())
-                yield from self.carry(carried, f"holding the object before the {surface.name}")
+                yield from self.carry(carried, f"holding the {self.thing} before the {surface.name}")
             view = yield from self._view(search, spot_W)
             search.add(view, spot_W)
             with PlanningAttempt() as attempt:
@@ -223,7 +223,7 @@ class Place(BinPlacement[PlaceInputs]):
                 raise SkillFailure(Cause.PLANNING, search.why_none()) from attempt.failure
             moves += 1
             if not (yield from self._draw_in(search.held)):
-                yield from self.carry(carried, "carrying the object on along the surface")
+                yield from self.carry(carried, f"carrying the {self.thing} on along the surface")
             yield from self.stand_as_usual()
             spot_W = yield from self._go_on(search)
 
@@ -322,11 +322,9 @@ class Place(BinPlacement[PlaceInputs]):
             return bool(arm.tuck_x_m)
         self.held = [held.box_H]
         try:
-            motion = self.move_to(
-                lambda scene, q: tucked_configuration(scene, arm, R_BH, q), "drawing the object in", CARRY_SPEED_RAD_S
-            )
+            message, tuck = f"drawing the {self.thing} in", partial(tucked_configuration, arm=arm, R_BH=R_BH)
             with PlanningAttempt() as attempt:
-                yield from motion
+                yield from self.move_to(lambda scene, q: tuck(scene, q_near_rad=q), message, CARRY_SPEED_RAD_S)
             return attempt.failure is None
         finally:
             self.held = ()
@@ -378,7 +376,7 @@ class Place(BinPlacement[PlaceInputs]):
         along_rad = longest_edge_rad(surface) - Pose2D.from_transform(X_WB).yaw_rad
         planner, opening = self.context.stack.arm_planner, self.release_opening()
         goal = above_goal(on_top, held, planner, beside, opening, lambda X_BH: area.takes(X_WB @ X_BH), along_rad)
-        q_rad = yield from self._bring(goal, held, f"bringing the object over the {surface.name}")
+        q_rad = yield from self._bring(goal, held, f"bringing the {self.thing} over the {surface.name}")
         X_BH = self.model.X_BH(q_rad)
         return PrePlacePose(q_rad, float(X_BH.translation()[2] - on_top[0][2]) - held.drop_m(X_BH.rotation()))
 
@@ -404,7 +402,7 @@ class Place(BinPlacement[PlaceInputs]):
         difference decides whether a path exists. After contact the arm rises a little, or it would dip onto the surface
         as the gripper releases. Raises SkillFailure with cause PLANNING when no path exists.
         """
-        message = f"putting the object down on the {surface.name}"
+        message = f"putting the {self.thing} down on the {surface.name}"
         p_BH = self.model.X_BH(above.q_rad).translation() - (above.height_m - _SURELY_FREE_M) * UP_B
         early = self.contact_guard(-UP_B, _LAG_IN_CONTACT_M, math.inf)
         stopped = yield from self.move_straight(p_BH, message, q_from_rad=above.q_rad, guard=early)
@@ -423,7 +421,7 @@ class Place(BinPlacement[PlaceInputs]):
             with suppress(PlanningError):
                 down_B = -part * (_SURELY_FREE_M + _PRESS_M) * UP_B
                 return (yield from self.press(down_B, -UP_B, speed_rad_s, message))
-        raise SkillFailure(Cause.PLANNING, "the arm cannot lower the object straight down")
+        raise SkillFailure(Cause.PLANNING, f"the arm cannot lower the {self.thing} straight down")
 
 
 def _by_distance(points_W: FloatArray, X_WB: RigidTransform) -> FloatArray:

@@ -60,6 +60,11 @@ Heights = dict[tuple[int, int], float]
 class PlaceVerification(ReleasingSkill[InputsT]):
     """Routine that releases an object on a surface, and checks whether it rests there."""
 
+    @property
+    def thing(self) -> str:
+        """Name of the object, also after its release."""
+        return str(self.checkpoint.get("thing", super().thing))
+
     def let_go(self, held_kg: float | None) -> Routine[None]:
         """Opens the gripper and draws back without dragging the object; shakes off an object that sticks to the hand.
 
@@ -71,13 +76,13 @@ class PlaceVerification(ReleasingSkill[InputsT]):
         left = yield from self.leave_object()
         if free and (yield from self.hangs_on_hand(held_kg, message)):
             yield from self.try_shift_hand(p_BH - self.model.X_BH(self.q_rad()).translation(), message)
-            free = yield from self.shake_off("shaking the object off the fingers", turns_hand=False)
+            free = yield from self.shake_off(f"shaking the {self.thing} off the fingers", turns_hand=False)
             left = yield from self.leave_object()
             free = free and not (yield from self.hangs_on_hand(held_kg, message))
         if not free:
-            raise SkillFailure(Cause.POSTCONDITION, "the object is still in the gripper")
+            raise SkillFailure(Cause.POSTCONDITION, f"the {self.thing} is still in the gripper")
         if not left:
-            raise SkillFailure(Cause.POSTCONDITION, "the object is put down, but the hand cannot draw back from it")
+            raise SkillFailure(Cause.POSTCONDITION, f"the {self.thing} is put down, but the hand cannot draw back")
 
     def check(
         self,
@@ -93,7 +98,7 @@ class PlaceVerification(ReleasingSkill[InputsT]):
         (B), on its path.
         """
         if self.context.robot.gripper().holding:
-            raise SkillFailure(Cause.POSTCONDITION, "the object is still in the gripper")
+            raise SkillFailure(Cause.POSTCONDITION, f"the {self.thing} is still in the gripper")
         end_s = self.context.clock.now() + _SETTLES_WITHIN_S
         p_WO = np.array([*spot_W, surface.height_m])
         while True:
@@ -101,12 +106,12 @@ class PlaceVerification(ReleasingSkill[InputsT]):
             if image is None:
                 yield from self.try_stow()
                 where = f"on the {surface.name} where it was put down"
-                raise SkillFailure(Cause.POSTCONDITION, f"the object is not seen {where}")
+                raise SkillFailure(Cause.POSTCONDITION, f"the {self.thing} is not seen {where}")
             if (yield from self.stays_at_rest(image, p_WO, _MOVES_ABOUT_M, "looking whether it is at rest")):
                 return
             if self.context.clock.now() > end_s:
                 yield from self.try_stow()
-                raise SkillFailure(Cause.POSTCONDITION, f"the object still moves on the {surface.name}")
+                raise SkillFailure(Cause.POSTCONDITION, f"the {self.thing} still moves on the {surface.name}")
 
     def _seen_again(
         self, surface: Surface, spot_W: FloatArray, put_down: Sequence[Box], before_W: FloatArray, within_m: float
@@ -196,7 +201,7 @@ class BinPlacement(PlaceVerification[InputsT]):
         Raises SkillFailure with cause POSTCONDITION when nothing is seen inside.
         """
         surface, held, area = search.surface, search.held, free_area(search.surface, search.held)
-        before, message = (yield from self._look_inside(surface)), f"bringing the object over the {surface.name}"
+        before, message = (yield from self._look_inside(surface)), f"bringing the {self.thing} over the {surface.name}"
 
         def above() -> Routine[FloatArray]:
             X_WB, planner = self.X_WB(), self.context.stack.arm_planner
@@ -218,11 +223,11 @@ class BinPlacement(PlaceVerification[InputsT]):
     def check_inside(self, surface: Surface, before: Heights) -> Routine[None]:
         """Raises SkillFailure with cause POSTCONDITION unless the bin holds more than in the heights `before`."""
         if self.context.robot.gripper().holding:
-            raise SkillFailure(Cause.POSTCONDITION, "the object is still in the gripper")
+            raise SkillFailure(Cause.POSTCONDITION, f"the {self.thing} is still in the gripper")
         after = yield from self._look_inside(surface)
         if risen_cells(before, after) < _LEAST_RISEN:
             yield from self.try_stow()
-            raise SkillFailure(Cause.POSTCONDITION, f"the object is not seen in the {surface.name}")
+            raise SkillFailure(Cause.POSTCONDITION, f"the {self.thing} is not seen in the {surface.name}")
 
     def _look_inside(self, surface: Surface) -> Routine[Heights]:
         """Looks steeply down into a bin; returns the heights of what is seen inside, none when no view is feasible."""

@@ -94,8 +94,8 @@ def test_an_object_lost_on_the_way_is_no_success(compiled, run_tree, make, robot
     assert (worst.outcome, worst.cause, worst.message) == (
         Outcome.FAILURE,
         Cause.EXECUTION,
-        "the coke was lost on the way to the start; pick the coke up again: the coke is not found again where it fell: "
-        "not seen; there is no surface within 2 m of (0.00, 0.00) m; there is only the floor",
+        "the coke was lost on the way to the start; pick the coke up again: the coke is not found again where it was "
+        "lost: not seen; there is no surface within 2 m of (0.00, 0.00) m; there is only the floor",
     )
 
 

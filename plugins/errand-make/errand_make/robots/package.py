@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
+
+import numpy as np
 
 from errand_make.robots.checks import fix_still_joints
 from errand_make.robots.inference import write_robot_file
@@ -14,15 +17,22 @@ from errand_make.robots.units import check_extent
 from executive.cli.new_command import PackageTemplates
 from executive.cli.output import console_for, progress_bar
 from plant.robots.robot_kind import robot_kinds
+from skills.api import PlanningError
+from skills.capabilities import Mount
 from skills.inputs.errors import InputError, listing
 from skills.manipulation.arm.collision import ArmScene
 from skills.manipulation.arm.kinematics import arm_model
+from skills.manipulation.arm.looking_skill import NO_HEAD, head_angles
 from skills.manipulation.arm.poses import compact_configuration
 from skills.robot import Capabilities, FloatArray
 
 _TEMPLATES: Final = PackageTemplates("robot", Path(__file__).parent / "templates")
 _BAND_M: Final = 0.05
 """Half the height band of a planar LiDAR's returns, which small tilts of the robot smear."""
+
+
+_TABLE_M, _BEFORE_TABLE_M = 0.75, 1.0
+"""Height of the table in the tests, and distance of the can on it from the robot that looks."""
 
 
 def check_robot_name(name: str) -> None:
@@ -59,13 +69,30 @@ def render_robot(name: str, urdf: Path, folder: Path, *, packages: Mapping[str, 
     height_m = can.lidar_height_m or 0.0
     words = {"low": f"{height_m - _BAND_M:.2f}", "high": f"{height_m + _BAND_M:.2f}"}
     lacking = [] if can.arm is not None else ["look", "stow"]
-    lacking += [] if can.object_camera is not None else ["look"]
-    lacking += [] if can.object_camera is not None and can.gripper is not None else ["take", "grasp"]
+    sees = can.object_camera is not None and _sees_table(can)
+    lacking += [] if sees else ["look"]
+    lacking += [] if sees and can.gripper is not None else ["take", "grasp"]
+    if can.object_camera is not None and not sees:
+        table = f"the top of a table {_TABLE_M} m high from {_BEFORE_TABLE_M:g} m before it"
+        why = f"does not move, and does not see {table}; so no test looks or grasps"
+        notes.append(f"cameras: {can.object_camera.source} {why}")
     _TEMPLATES.render(name, folder, words=words, without={f"{each}.skilltest.yaml" for each in lacking})
     if still:
         what = f"joint{'s' * (len(still) > 1)} {listing(still)}: lower and upper are both 0, so taken as fixed"
         notes.append(f"urdf: {what}; write the range of one that moves")
     return [*notes, *(f"meshes: {note}" for note in copies.all_notes())]
+
+
+def _sees_table(can: Capabilities) -> bool:
+    """True when the camera for objects moves, or has the top of a table before the robot in view, and is higher."""
+    camera = can.object_camera
+    if camera is None or camera.mount is not Mount.BODY:
+        return True
+    over_m = _TABLE_M - can.standing_height_m
+    with suppress(PlanningError):
+        head_angles(NO_HEAD, camera, np.array([_BEFORE_TABLE_M, 0.0, over_m]))
+        return float(camera.X_FC.translation()[2]) > over_m
+    return False
 
 
 def _stowed(can: Capabilities, tries: Sequence[FloatArray]) -> FloatArray:

@@ -66,6 +66,17 @@ def test_joints_of_pan_and_tilt_are_a_head_that_carries_the_camera(tmp_path):
     assert np.allclose(can.head.p_BP_m, [-0.10, 0.0, 1.12]) and can.object_camera.mount is Mount.HEAD
 
 
+# Height (m) and tilt (rad) of a camera on the mast, which begins 0.25 m above the floor -> whether tests look and grasp
+@pytest.mark.parametrize(
+    ("eye", "looks"), [((0.9, 0.6), True), ((0.9, 0.0), True), ((1.3, 0.0), False), ((0.1, 0.0), False)]
+)
+def test_a_camera_that_does_not_see_a_table_is_not_tested_on_one(tmp_path, eye, looks):
+    notes = render_robot("made", write_package(tmp_path, eye=eye), tmp_path / "made", packages={})
+    tests = {path.name.split(".")[0] for path in (tmp_path / "made/tests").glob("*.yaml")}
+    assert {"look", "take", "grasp"} & tests == ({"look", "take", "grasp"} if looks else set())
+    assert any("camera_0 does not move, and does not see the top of a table" in each for each in notes) is not looks
+
+
 @pytest.mark.parametrize("options", [{"with_gripper": False}, {"with_arm": False}])
 def test_a_robot_may_have_no_gripper_or_no_arm(tmp_path, options):
     render_robot("rover", write_package(tmp_path, **options), tmp_path / "made", packages={})

@@ -35,7 +35,7 @@ def ended(leaf, clock):
 
 
 def test_it_says_what_happened(leaf, clock):
-    assert ended(leaf, clock).message == "the hammer fell on the way to the kitchen; it is picked up again"
+    assert ended(leaf, clock).message == "the hammer has left the gripper on the way to the kitchen; it is looked for"
 
 
 def test_an_object_that_is_felt_after_all_has_slipped(leaf, clock, robot):

@@ -305,7 +305,7 @@ def test_an_object_of_an_earlier_step_is_picked_up_again_when_it_falls_later(wor
     there = "Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"
     assert worst(GRASP, there, observer=observer).outcome is Outcome.SUCCESS
     assert script.begun[script.begun.index("grasp") :].count("grasp") == 2
-    assert "the coke fell on the way to the bedroom; it is picked up again" in told(published)
+    assert "the coke has left the gripper on the way to the bedroom; it is looked for" in told(published)
 
 
 def test_a_drive_with_an_empty_gripper_has_no_guard(compiled):
@@ -318,7 +318,7 @@ def test_a_loss_ends_the_running_skill_within_three_ticks_and_is_told(carrying, 
     ended = next(m["t"] for topic, m in published if topic == "transitions" and m["cause"] is Cause.EXECUTION)
     assert ended - 0.55 <= 0.15
     assert script.ended[0] == "navigate"
-    assert "the coke fell on the way to the bedroom; it is picked up again" in told(published)
+    assert "the coke has left the gripper on the way to the bedroom; it is looked for" in told(published)
 
 
 def test_a_dropped_object_is_searched_where_the_robot_was(carrying, fails):
@@ -368,7 +368,7 @@ def test_a_dropped_object_that_is_not_found_is_a_failure(carrying, script):
     result = carrying(0.5, seen_on=())
     assert (result.outcome, result.cause) == (Outcome.FAILURE, Cause.EXECUTION)
     assert result.message.startswith("the coke was lost on the way to the bedroom; pick the coke up again: ")
-    assert "the coke is not found again where it fell: not seen" in result.message
+    assert "the coke is not found again where it was lost: not seen" in result.message
     assert script.begun[3:] == ["detect", "navigate", "detect", "navigate", "detect", "stow"]
 
 

@@ -10,7 +10,7 @@ from table_scene import RED, Can
 from table_scene import TABLE as TOP
 
 from plant.robots.spot.kind import spot_capabilities
-from skills.api import Cause, Failed, Running, Succeeded, Surface
+from skills.api import Cause, Failed, ObjectKind, Running, Succeeded, Surface
 from skills.manipulation.arm.kinematics import arm_model
 from skills.manipulation.place.free_spots import HeldObject, SpotSearch
 from skills.manipulation.place.skill import Place, PlaceInputs
@@ -91,6 +91,17 @@ def test_an_object_held_after_a_restart_is_put_down_as_it_was_brought():
     skill = Place(context_of(carrying()))
     skill.checkpoint = {"carried": np.eye(3).tolist()}
     assert np.array_equal(skill._carried().matrix(), np.eye(3))
+
+
+def test_messages_name_the_object_that_was_grasped():
+    robot = carrying()
+    context = context_of(robot)
+    context.payload.kind = ObjectKind("mug", ("red",))
+    skill = Place(context)
+    skill._carried()
+    assert skill.undone(PlaceInputs(TABLE)) == "the red mug is still in the gripper"
+    context.payload.kind = None
+    assert skill.undone(PlaceInputs(TABLE)) == "the red mug is still in the gripper"
 
 
 def test_an_object_still_in_the_gripper_is_a_failed_postcondition():

@@ -133,12 +133,11 @@ class HandOver(HandOverVerification[HandOverInputs]):
     def run_again(self, inputs: HandOverInputs) -> Routine[Succeeded]:
         """Continues an interrupted attempt; after the release it only checks whether the person has the object."""
         self._watch = None
-        if not self.checkpoint.get("lets_go"):
-            return (yield from self.run(inputs))
-        seen = yield from self._let_go(inputs, None)
-        if seen is not Seen.IN_GRIPPER:
-            return self._given(inputs, seen)
-        self.checkpoint = {}
+        if self.checkpoint.get("lets_go"):
+            seen = yield from self._let_go(inputs, None)
+            if seen is not Seen.IN_GRIPPER:
+                return self._given(inputs, seen)
+            self.checkpoint = {}
         return (yield from self.run(inputs))
 
     def _given(self, inputs: HandOverInputs, seen: Seen) -> Succeeded:
@@ -184,8 +183,7 @@ class HandOver(HandOverVerification[HandOverInputs]):
             corners_H = self.context.payload.corners_H
             release = release_of(self.X_WB() @ self.model.X_BH(self.q_rad()), self.p_HT, corners_H)
             self.checkpoint = {"lets_go": True, "release": asdict(release)}
-        free = (yield from self.open_hand(message)) and not (yield from self.hangs_on_hand(held_kg, message))
-        if not free:
+        if not (yield from self.open_hand(message)) or (yield from self.hangs_on_hand(held_kg, message)):
             yield from self.shake_off(f"shaking the {name} off the fingers", turns_hand=True)
         yield from self.leave_object()
         return (yield from self.verify(name, inputs.person, Release(**self.checkpoint["release"])))

@@ -8,7 +8,6 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, InputsT, Surface
-from skills.geometry import inside_polygon
 from skills.manipulation.arm.collision import Box
 from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints, towards_shoulder
 from skills.manipulation.arm.releasing_skill import ReleasingSkill
@@ -164,7 +163,8 @@ def lies_at(image: Image, X_WO: RigidTransform, release: Release, lowest_m: floa
     square = tuple((release.x_m + _PLATE_M * x, release.y_m + _PLATE_M * y) for x, y in corners)
     levels_m = np.arange(lowest_m - _PLATE_OFF_M, release.low_m + _PLATE_OFF_M, _LEVEL_M)
     p_W = cloud_from_image(image, X_WO, heights_m=(levels_m[0], levels_m[-1])).p_W
-    counts, _ = np.histogram(p_W[inside_polygon(p_W[:, :2], square, 0.0), 2], bins=levels_m)
+    over = np.abs(p_W[:, :2] - [release.x_m, release.y_m]).max(axis=1) < _PLATE_M
+    counts, _ = np.histogram(p_W[over, 2], bins=levels_m)
     view = segment_surface(image, X_WO, Surface("plate", square, float(levels_m[np.argmax(counts)])))
     if view is None:
         return False
@@ -198,14 +198,11 @@ class HandOverVerification(ReleasingSkill[InputsT]):
         A hand camera looks before the arm is stowed; for a head camera the arm leaves the view first.
         """
         message = f"looking whether {person} has the {name}"
-        if self.object_camera.on_hand:
-            seen = yield from self._watched(name, release, message)
-            yield from self._stow_beside(release, message)
-            return Seen.IN_GRIPPER if self.context.robot.gripper().holding else seen
+        seen = (yield from self._watched(name, release, message)) if self.object_camera.on_hand else None
         yield from self._stow_beside(release, message)
         if self.context.robot.gripper().holding:
             return Seen.IN_GRIPPER
-        return (yield from self._watched(name, release, message))
+        return seen or (yield from self._watched(name, release, message))
 
     def _watched(self, name: str, release: Release, message: str) -> Routine[Seen]:
         """Looks until the object is seen, and then until it is at rest."""

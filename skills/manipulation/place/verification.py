@@ -97,8 +97,6 @@ class PlaceVerification(ReleasingSkill[InputsT]):
         `before_W` (N, 2) are points on the objects that stood there before. The arm avoids `put_down`, the object's box
         (B), on its path.
         """
-        if self.context.robot.gripper().holding:
-            raise SkillFailure(Cause.POSTCONDITION, f"the {self.thing} is still in the gripper")
         end_s = self.context.clock.now() + _SETTLES_WITHIN_S
         p_WO = np.array([*spot_W, surface.height_m])
         while True:
@@ -222,8 +220,6 @@ class BinPlacement(PlaceVerification[InputsT]):
 
     def check_inside(self, surface: Surface, before: Heights) -> Routine[None]:
         """Raises SkillFailure with cause POSTCONDITION unless the bin holds more than in the heights `before`."""
-        if self.context.robot.gripper().holding:
-            raise SkillFailure(Cause.POSTCONDITION, f"the {self.thing} is still in the gripper")
         after = yield from self._look_inside(surface)
         if risen_cells(before, after) < _LEAST_RISEN:
             yield from self.try_stow()

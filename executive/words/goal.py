@@ -17,7 +17,7 @@ class GoalKind(enum.Enum):
     PLACED = "placed"  # resting in a goal region, let go
     WENT = "went"  # the robot's body in a goal region
     ANSWERED = "answered"  # the answer is what is true of the source regions
-    DOOR_OPEN = "door open"  # the answer is whether the door in the source region is open (`wanted` "closed": closed)
+    DOOR_OPEN = "door open"  # the answer is whether the door in the source region is open
     DOOR_OPENED = "door opened"  # the door in the source region is open
     CLEARED = "cleared"  # nothing rests in the source regions; with goal regions, all that did rests there, let go
     MET = "met"  # the robot is close to the person
@@ -70,9 +70,10 @@ class GoalCondition:
     of the objects or of the robot (any of the regions). `person` receives the object or, if the class is "person", is
     searched for (None: anyone); to be met, `person` must stand in `goal` (empty: anywhere). `task` is the word of the
     task whose page judges an OWN condition, for which `spoken_s` has the times at which the robot spoke, and `said`
-    what it said. `answer` is the answer that the robot gave at `answered_s` (None: now): yes, no, or a number, perhaps
-    `at_least` so many; `looked_s` has its looks: the name of the source, begin and end (s). `robot` must act (None:
-    any). `relations` say which objects of the source are meant, or for PLACED where in the goal.
+    what it said. `answer` is the answer that the robot gave to `question` at `answered_s` (None: now): yes, no, or a
+    number, perhaps `at_least` so many; `negated` says that yes stands for what is not so. `looked_s` has its looks: the
+    name of the source, begin and end (s). `robot` must act (None: any). `relations` say which objects of the source are
+    meant, or for PLACED where in the goal.
 
     `when` says at which times the condition must hold. The step ran from `began_s` (None: since `since_s`) to `ended_s`
     (None: it ends now). A later step of the same mission may lift the objects again within the intervals `taken_s`.
@@ -86,7 +87,9 @@ class GoalCondition:
     goal: tuple[Region, ...] = ()
     maybe: tuple[Region, ...] = ()
     person: str | None = None
+    question: str = ""
     answer: int | None = None
+    negated: bool = False
     at_least: bool = False
     answered_s: float | None = None
     looked_s: tuple[tuple[str, float, float], ...] = ()

@@ -178,16 +178,19 @@ def judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
             (there if is_sure else aside).append(f"{name} {verb} {on} {the(region.name)}")
     most = len(there) + len(aside)
     if told is None or isinstance(told, bool):
-        right = told is not None and (most >= condition.needed if told else len(there) < condition.needed)
+        there_is = told != condition.negated
+        right = told is not None and (most >= condition.needed if there_is else len(there) < condition.needed)
     else:
         right = told <= most and (condition.at_least or told >= len(there))
-    return Finding(right, f"the answer was {said(condition)}, and {' and '.join((*there, *aside)) or nothing}.")
+    return Finding(right, f"{said(condition)}, and {' and '.join((*there, *aside)) or nothing}.")
 
 
 def said(condition: GoalCondition) -> str:
-    """Text of the answer that a condition is about: "yes", "no", "nothing", "2" or "at least 2"."""
+    """Words for the answer that a condition is about: yes, no, nothing, 2 or at least 2, with its question."""
     number = f"at least {condition.answer}" if condition.at_least else str(condition.answer)
-    return {"True": "yes", "False": "no", "None": "nothing"}.get(number, number)
+    told = {"True": "yes", "False": "no", "None": "nothing"}.get(number, number)
+    asked = condition.question and f' to "{condition.question}"'
+    return f"the answer{asked} was {told}"
 
 
 _Places = Callable[[float, float], Iterable[FloatArray | None]]

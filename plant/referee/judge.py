@@ -255,9 +255,9 @@ def _judge_at(condition: GoalCondition, robot: str, truth: Truth) -> Finding:
 def _judge_door(condition: GoalCondition, truth: Truth) -> Finding:
     """Judges an answer by the state of the door while the robot looked; for a moving door, both answers are right."""
     was = _door_state(condition, truth, truth.now_s if condition.answered_s is None else condition.answered_s)
-    is_open = condition.answer != (condition.wanted == "closed")
+    is_open = condition.answer != condition.negated
     right = condition.answer is not None and was in ("moving", "open" if is_open else "closed")
-    return Finding(right, f"the answer was {said(condition)}, and {the(condition.source[0].name)} was {was}.")
+    return Finding(right, f"{said(condition)}, and {the(condition.source[0].name)} was {was}.")
 
 
 def _judge_opened(condition: GoalCondition, truth: Truth) -> Finding:

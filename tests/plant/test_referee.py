@@ -567,6 +567,21 @@ def test_an_answer_about_people_is_judged_by_where_they_stand(room, person, coun
         assert (verdict.success, told in verdict.why) == (right, True)
 
 
+# room, answer to whether nobody is in it -> right
+@pytest.mark.parametrize(
+    ("room", "answer", "right"), [(ROOM, False, True), (ROOM, True, False), (OTHER, True, True), (OTHER, False, False)]
+)
+def test_the_referee_says_the_negated_question_that_it_judges(room, answer, right):
+    question = f"is nobody in {room.name}"
+    asked = GoalCondition(
+        GoalKind.ANSWERED, ("person",), source=(room,), question=question, answer=answer, negated=True
+    )
+    who = "robin" if room is ROOM else "nobody"
+    said = f'The answer to "{question}" was {"yes" if answer else "no"}, and {who} is in {room.name}.'
+    verdict = Stage().watch().referee.judge([asked])
+    assert (verdict.success, verdict.why) == (right, said)
+
+
 # answer to how many, at least so many -> right where one person stands in the kitchen
 @pytest.mark.parametrize(
     ("answer", "at_least", "right"),
@@ -631,7 +646,7 @@ def test_an_answer_about_a_door_is_judged_by_how_it_was_while_the_robot_looked(a
     answers = (True, False, None)
     judged = {each: judge([replace(asked, answer=each)], DOOR_TRUTH, collisions=()).success for each in answers}
     assert {answer for answer, success in judged.items() if success} == right
-    shut = replace(asked, wanted="closed")
+    shut = replace(asked, negated=True)
     judged = {each: judge([replace(shut, answer=each)], DOOR_TRUTH, collisions=()).success for each in answers}
     assert {not answer for answer, success in judged.items() if success} == right
 

@@ -136,7 +136,7 @@ def _answers(
             for each in took
             if each.path_id in leaves
         )
-        given = replace(condition, answer=answer, at_least=one.at_least)
+        given = replace(condition, question=one.question, answer=answer, at_least=one.at_least)
         yield replace(given, answered_s=one.t_s, looked_s=looked_s)
     if not answers and any(one.done for one in executions):
         yield condition

@@ -293,17 +293,21 @@ def decide_plan(flow: Flow, condition: Condition, builder: PlanBuilder) -> tuple
     return node, key, tuple(part for _, part in looks)
 
 
-def look_plan(builder: PlanBuilder, number: int, look: Look | DoorOpen, key: str) -> tuple[NodeSpec, StepPart]:
-    """Plans a look for a decision; returns its node, and its step with the goal condition."""
+def look_plan(
+    builder: PlanBuilder, number: int, look: Look | DoorOpen, key: str, *, negated: bool = False
+) -> tuple[NodeSpec, StepPart]:
+    """Plans a look whose answer is that something is so, or not if `negated`; returns its node, and its step."""
     below = builder.at(f"look-{number}")
     if isinstance(look, DoorOpen):
-        plan = door_plan(below, look.between, key, look.max_age_s)
+        plan = door_plan(below, look.between, key, look.max_age_s, negated=negated)
         check = next(node for node in plan.walk() if node.behaviour.answers)
-        return plan, StepPart(check.path_id, goal=door_goal(builder.knowledge, look.between))
+        door = door_goal(builder.knowledge, look.between)
+        return plan, StepPart(check.path_id, goal=replace(door, negated=negated))
     below = replace(below, command=look.command)
     refuse_several(below)
     goal = command_goal(look.command, builder.knowledge)
-    return find_plan(below, key), StepPart(below.path_id, look.command, goal=goal)
+    goal = goal and replace(goal, negated=negated)
+    return find_plan(below, key, negated=negated), StepPart(below.path_id, look.command, goal=goal)
 
 
 def decision_of(flow: Flow, condition: Condition, builder: PlanBuilder) -> Decision:
@@ -340,7 +344,6 @@ class Check(ExplainedDecorator):
 
     kind = "check"
     answers = True
-    question: str
     key: str
     context: RunContext
     negated: bool = False
@@ -351,27 +354,22 @@ class Check(ExplainedDecorator):
         if status == Status.SUCCESS:
             answer = self.context.board.get(self.key) != self.negated
             self.context.board.put(self.key, answer)
-            note = {"node": self.path_id, "question": self.question, "answer": answer, "message": self.message}
+            question = self.name.removesuffix("?")
+            note = {"node": self.path_id, "question": question, "answer": answer, "message": self.message}
             self.context.publish(ANSWER_TOPIC, note)
         return status
 
 
 def _plan(assembler: Assembler, block: model.Check, builder: PlanBuilder) -> Assembled:
     below, condition, name = builder.at("check"), block.condition, block.answer_name
-    if isinstance(condition, Look) and not condition.max_age_s:
+    look = condition.part if (negated := isinstance(condition, Not)) else condition
+    if isinstance(look, Look | DoorOpen) and not look.max_age_s:
         key = assembler.give(name, below.at("look-1").key("answer"), bool, builder)
-        look, part = look_plan(below, 1, condition, key)
-        return Assembled((look,), (part,))
-    door = condition.part if (closed := isinstance(condition, Not)) else condition
-    if isinstance(door, DoorOpen) and not door.max_age_s:
-        key = assembler.give(name, below.key("answer"), bool, builder)
-        look = door_plan(below, door.between, key, closed=closed)
-        goal = door_goal(builder.knowledge, door.between)
-        return Assembled((look,), (StepPart(look.path_id, goal=replace(goal, wanted="closed" if closed else "")),))
+        node, part = look_plan(below, 1, look, key, negated=negated)
+        return Assembled((node,), (part,))
     decide, key, parts = decide_plan(assembler.flow, condition, below)
     key = assembler.give(name, key, bool, builder)
-    question = str(condition)
-    node = builder.node("check", f"{question}?", decide.with_options(key=key), question=question, key=key)
+    node = builder.node("check", decide.name, decide.with_options(key=key), key=key)
     return Assembled((node,), parts)
 
 

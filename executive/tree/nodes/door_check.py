@@ -81,17 +81,17 @@ class BeforeDoor(MemoryComposite):
 
 
 def door_plan(
-    builder: PlanBuilder, between: tuple[str, str], key: str, max_age_s: float = 0.0, *, closed: bool = False
+    builder: PlanBuilder, between: tuple[str, str], key: str, max_age_s: float = 0.0, *, negated: bool = False
 ) -> NodeSpec:
-    """Looks whether a door is open or `closed`; writes the answer to `key`. Knowledge `max_age_s` old spares a look.
+    """Looks whether a door is open, or closed if `negated`; answers to `key`. Knowledge `max_age_s` old spares a look.
 
     Raises InputError when the world has no such door.
     """
     door = _door(builder, between)
     below = builder.at("look") if max_age_s else builder
     look = below.first_of(_FROM_EITHER, *_looks(below, door, key), part="look")
-    question = f"is the {_name(door)} {'closed' if closed else 'open'}"
-    check = below.node("check", f"{question}?", look, question=question, key=key, negated=closed)
+    question = f"is the {_name(door)} {'closed' if negated else 'open'}?"
+    check = below.node("check", question, look, key=key, negated=negated)
     return _known_or(builder, door, check, key, max_age_s) if max_age_s else check
 
 

@@ -60,16 +60,17 @@ class Answer(ExplainedDecorator):
     `looks` has the leaves for each surface, one for each viewpoint; a surface is seen when each leaf succeeded or
     failed with POSTCONDITION. The answer is published under `ANSWER_TOPIC`; with `tells` it includes the found object,
     and it names objects that no look recognised, which the leaves write under the keys `doubts`.
-    `question` is the text for yes, `denied` the text for no; without `yes_or_no` the text stands alone, because "is it
-    empty" and "is there anything on it" are one question. The leaves write all found objects under the blackboard keys
-    `tallies`, also when they fail. Each object counts once; the number is written under `count_key`, if given. The
-    answer is `numeric` where that is asked for; `related` says which objects are counted.
+    The node's name is the question. `affirmed` is the text for yes, `denied` the text for no; without `yes_or_no` the
+    text stands alone, because "is it empty" and "is there anything on it" are one question. A `negated` question asks
+    whether nothing is found, and has yes and no the other way round. The leaves write all found objects under the
+    blackboard keys `tallies`, also when they fail. Each object counts once; the number is written under `count_key`, if
+    given. The answer is `numeric` where that is asked for; `related` says which objects are counted.
     """
 
     kind = "answer"
     answers = True
     output_types: ClassVar = {"key": bool, "count_key": float}
-    question: str
+    affirmed: str
     denied: str
     looks: Mapping[str, Sequence[str]]
     key: str
@@ -83,6 +84,7 @@ class Answer(ExplainedDecorator):
     count_key: str = ""
     numeric: bool = False
     related: str = ""
+    negated: bool = False
     answer: int | None = field(default=None, init=False)
 
     def answered(self) -> int | None:
@@ -135,13 +137,15 @@ class Answer(ExplainedDecorator):
         return self.fail(Failed(cause, f"no answer for {', '.join(unseen)}: {self.message}"))
 
     def _answered(self, answer: int, found: str, is_least: bool = False) -> Status:
-        self.answer, self.cause = answer, None
-        text = self.question if answer else self.denied
+        text = self.affirmed if answer else self.denied
+        self.answer = answer = answer if self.numeric else bool(answer) != self.negated
+        self.cause = None
         if self.yes_or_no:
             text = f"{'yes' if answer else 'no'}: {text}"
         self.message = found if found and self.numeric else "; ".join(filter(None, (text, found)))
         self.board.put(self.key, float(answer) if self.numeric else answer)
-        note = {"node": self.path_id, "question": self.question, "answer": answer, "message": self.message}
+        question = self.name.removesuffix("?")
+        note = {"node": self.path_id, "question": question, "answer": answer, "message": self.message}
         self.publish(ANSWER_TOPIC, note | ({"at_least": True} if is_least else {}))
         return Status.SUCCESS
 
@@ -365,11 +369,12 @@ def place_phrase(knowledge: Knowledge, place: str | None) -> str:
     return f"{'on' if place in knowledge.tops else 'in'} the {place}"
 
 
-def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
+def find_plan(builder: PlanBuilder, answer_key: str | None = None, *, negated: bool = False) -> NodeSpec:
     """Looks at the place's surfaces and answers yes or no, with the place or the number if the question asks for it.
 
-    The answer is written under `answer_key` (None: a key of this subtree). The first found object ends the search,
-    unless objects are counted: then all surfaces are searched. People are searched in rooms.
+    The answer is written under `answer_key` (None: a key of this subtree); with `negated`, yes stands for none. The
+    first found object ends the search, unless objects are counted: then all surfaces are searched. People are searched
+    in rooms.
     """
     command, knowledge = builder.command, builder.knowledge
     place = None if command.goal is None else builder.place(command.goal)
@@ -396,17 +401,19 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
         {p: keys[port] for p, keys in outputs.items() if port in keys} for port in (_TALLY, _UNEXPLAINED)
     )
     spot, counts = place_phrase(knowledge, place), answer_key is None and command.object_count == 0
-    denied = f"{'not' if command.object_count > 1 or person in knowledge.people else 'no'} {absent} {spot}"
+    denial = "{} is not" if person in knowledge.people else "not {}" if command.object_count > 1 else "no {}"
+    denied = f"{denial.format(absent)} {spot}"
     if what == ANYTHING:
         asked, denied = "something", f"nothing {spot}"
     elif person == ANYBODY and not counting:
         denied = f"nobody {spot}"
     named = "is" if person in knowledge.people else "are there" if counting and what != ANYTHING else "is there"
+    sought = denied.replace(" is not ", " not ") if negated else f"{asked} {spot}"
     answer = builder.node(
         "answer",
-        f"{named} {asked} {spot}?",
+        f"how many {asked} are {spot}?" if counts and what != ANYTHING else f"{named} {sought}?",
         search,
-        question=asked if place is None else f"{asked} {spot}",
+        affirmed=asked if place is None else f"{asked} {spot}",
         denied=denied,
         looks=MappingProxyType(_leaves(looks)),
         key=answer_key or builder.key("answer"),
@@ -417,6 +424,7 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
         yes_or_no=what != ANYTHING and not counts,
         numeric=counts,
         related=related,
+        negated=negated,
     )
     return builder.at("tidy").stow_after(answer)
 

@@ -59,7 +59,7 @@ class Comparison(Answer):
             return self.fail(Failed(Cause.PRECONDITION, f"the weight of {named} is not known; add it to {FACTS_FILE}"))
         first = sorted(every, key=lambda one: self._key(one, order))[: self.most]
         if strange := [one for one in first if one.kind.name == ANY_OBJECT]:
-            what = f"I cannot tell what is {self.question}: {listing(map(describe_unknown, strange))}"
+            what = f"I cannot tell what is {self.affirmed}: {listing(map(describe_unknown, strange))}"
             return self.fail(Failed(Cause.POSTCONDITION, what))
         return self._say(first, order)
 
@@ -70,11 +70,11 @@ class Comparison(Answer):
         """Writes the sentence, and publishes it as the answer."""
         names = listing(f"the {spoken_name(one.kind.name)}" for one in first)
         source = ", by the weights in my notes" if order.weighs else ""
-        said = f"{self.question} {'is' if len(first) == 1 else 'are'} {names}{source}" if first else self.denied
+        said = f"{self.affirmed} {'is' if len(first) == 1 else 'are'} {names}{source}" if first else self.denied
         self.answer, self.cause, self.message = bool(first), None, said
         self.board.put(self.key, bool(first))
         self.board.put(self.text, said)
-        note = {"node": self.path_id, "question": self.question, "answer": bool(first), "message": said}
+        note = {"node": self.path_id, "question": self.affirmed, "answer": bool(first), "message": said}
         self.publish(ANSWER_TOPIC, note)
         return Status.SUCCESS
 
@@ -100,7 +100,7 @@ def compare_plan(builder: PlanBuilder) -> NodeSpec:
     number = "" if most == 1 else f"{_NUMBERS[most] if most < len(_NUMBERS) else most} "
     where, text = place_phrase(knowledge, place), builder.key("text")
     question = f"the {number}{superlative} {item.name if most == 1 else plural(item.name)} {where}"
-    options = {"question": question, "denied": f"there is no {item.name} {where}", "superlative": superlative}
+    options = {"affirmed": question, "denied": f"there is no {item.name} {where}", "superlative": superlative}
     weights = facts_of(knowledge).weights if ORDERS[superlative].weighs else {}
     compared = replace(answer, kind=Comparison.kind, name=f"compare: {question}").with_options(
         **options, most=most, weights=weights, text=text

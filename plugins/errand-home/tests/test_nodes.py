@@ -36,7 +36,7 @@ def compared(context, scripts, found, superlative, most=1, weights=WEIGHTS):
         path_id="alice/q",
         name="q",
         child=MemoryRound(path_id="alice/q/search", name="search", children=children),
-        question=f"the {superlative} object on the desk",
+        affirmed=f"the {superlative} object on the desk",
         denied="there is no object on the desk",
         looks={"desk": [child.path_id for child in children]},
         key="alice/q/answer",

@@ -5,6 +5,7 @@ import re
 import pytest
 from py_trees.common import Status
 
+from executive.app.runs.goal_conditions import conditions_of
 from executive.run.outcome import Outcome
 from executive.tree.behaviour import ExplainedDecorator, ExplainedNode, MemoryComposite
 from executive.tree.board import FromBoard
@@ -14,7 +15,7 @@ from executive.tree.node import NodeSpec, node_classes, node_pages
 from executive.tree.nodes.policies import Timeout
 from executive.words.command import parse_command
 from executive.words.knowledge import TagFacts
-from executive.words.leaf_steps import Do, steps_of_commands
+from executive.words.leaf_steps import Check, Do, steps_of_commands
 from executive.words.mission import Mission
 from executive.words.step import Place
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Succeeded
@@ -144,6 +145,22 @@ def test_a_status_check_names_every_look(compiled):
     }
 
 
+def seeing_people_in(rooms):
+    """How a look for people ends who stand in some rooms."""
+
+    def look(skill):
+        if skill.inputs.place not in rooms:
+            return Failed(Cause.POSTCONDITION, "nobody")
+        (x_m, y_m), *_ = skill.inputs.area_W
+        who = ObjectKind(skill.inputs.person)
+        seen = ObjectObservation(0.0, who, (x_m, y_m, 1.0), (0.5, 0.5, 1.7), 0.0, 0.9, skill.inputs.place)
+        return Succeeded(
+            f"saw them in the {skill.inputs.place}", {"observation": seen, "observations": (seen,), "unexplained": ()}
+        )
+
+    return look
+
+
 # goal        asked           people in   answer  rooms looked at  told
 @pytest.mark.parametrize(
     ("goal", "asked", "people_in", "answer", "looks", "told"),
@@ -152,7 +169,7 @@ def test_a_status_check_names_every_look(compiled):
         ("kitchen", "person", set(), False, 1, "no: nobody in the kitchen"),
         ("Nothing", "person", {"bedroom"}, True, 2, "yes: somebody; saw them in the bedroom"),
         ("Nothing", "Robin", {"hall"}, True, 1, "yes: Robin; saw them in the hall"),
-        ("Nothing", "Robin", set(), False, 4, "no: not Robin anywhere"),
+        ("Nothing", "Robin", set(), False, 4, "no: Robin is not anywhere"),
         ("Nothing", "some person", {"hall", "kitchen"}, 2, 4, "there are two people in the"),
         ("kitchen", "some person", set(), 0, 1, "no people in the kitchen"),
         ("kitchen", "2 person", {"kitchen"}, False, 1, "no: not two people in the kitchen; there is one person in the"),
@@ -163,21 +180,41 @@ def test_people_are_looked_for_in_rooms(
 ):
     del knowledge.people["Sam"]
 
-    def look(skill):
-        if skill.inputs.place not in people_in:
-            return Failed(Cause.POSTCONDITION, "nobody")
-        (x_m, y_m), *_ = skill.inputs.area_W
-        who = ObjectKind(skill.inputs.person)
-        seen = ObjectObservation(0.0, who, (x_m, y_m, 1.0), (0.5, 0.5, 1.7), 0.0, 0.9, skill.inputs.place)
-        return Succeeded(
-            f"saw them in the {skill.inputs.place}", {"observation": seen, "observations": (seen,), "unexplained": ()}
-        )
-
-    script.ends["find_people"] = look
+    script.ends["find_people"] = seeing_people_in(people_in)
     worst = run_tree(compiled(f"Take [Nothing] to [{goal}] and do [find] to [{asked}]")).worst
     assert (worst.outcome, list(worst.answers.values())) == (Outcome.SUCCESS, [answer])
     assert worst.message.startswith(told)
     assert script.begun.count("find_people") == looks
+
+
+# not what      people in  answer  question  told
+@pytest.mark.parametrize(
+    ("asked", "people_in", "answer", "question", "told"),
+    [
+        ("person", set(), True, "is there nobody in the kitchen", "yes: nobody in the kitchen"),
+        ("person", {"kitchen"}, False, "is there nobody in the kitchen", "no: somebody in the kitchen"),
+        ("Robin", set(), True, "is Robin not in the kitchen", "yes: Robin is not in the kitchen"),
+        (
+            "2 person",
+            {"kitchen"},
+            True,
+            "are there not two people in the kitchen",
+            "yes: not two people in the kitchen",
+        ),
+    ],
+)
+def test_a_negated_question_has_one_answer_with_its_question(
+    knowledge, registry, run_tree, script, asked, people_in, answer, question, told
+):
+    del knowledge.people["Sam"]
+    script.ends["find_people"] = seeing_people_in(people_in)
+    steps = (Check(condition={"not": {"object": asked, "at": "kitchen"}}),)
+    mission = Mission(name="check", robot="Alice", steps=steps)
+    worst = run_tree(compile_mission(mission, knowledge=knowledge, registry=registry)).worst
+    (found,) = worst.findings
+    assert (found.question, found.answer, found.sentence.split(";")[0]) == (question, answer, told)
+    (condition,) = conditions_of(worst.tree, worst)
+    assert (condition.question, condition.answer, condition.negated) == (question, answer, True)
 
 
 # how many the look found before it failed -> the answer, or none

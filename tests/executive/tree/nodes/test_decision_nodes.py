@@ -225,10 +225,10 @@ def test_decide_lets_a_look_end_that_has_left_its_answer(decide, run_context, lo
 @pytest.mark.parametrize(("script", "answer", "expected"), [("RS", True, "RS"), ("S", False, "S"), ("F", None, "F")])
 def test_check(run_context, published, script, answer, expected):
     child = Leaf(script, put=lambda: run_context.board.put(KEY, answer))
-    root = Check(path_id="alice/check", name="check", child=child, question="so?", key=KEY, context=run_context)
+    root = Check(path_id="alice/check", name="so?", child=child, key=KEY, context=run_context)
     assert play(root, expected) == expected
     told = [(message["question"], message["answer"]) for topic, message in published if topic == ANSWER_TOPIC]
-    assert told == ([] if expected == "F" else [("so?", answer)])
+    assert told == ([] if expected == "F" else [("so", answer)])
     assert root.cause is (Cause.EXECUTION if expected == "F" else None)
 
 

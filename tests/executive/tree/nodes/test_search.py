@@ -12,9 +12,17 @@ from tests.executive.tree.scripted import CAUSES, F, Leaf, S
 
 def asked(context, search, looks, question, **more):
     """An answer after its search."""
-    told = {"question": question, "denied": question, **more}
+    told = {"affirmed": question, "denied": question, **more}
     services = {"board": context.board, "publish": context.publish}
-    root = Answer(path_id="alice/q", name="q", child=search, looks=looks, key="alice/q/answer", **services, **told)
+    root = Answer(
+        path_id="alice/q",
+        name=f"is there a {question}?",
+        child=search,
+        looks=looks,
+        key="alice/q/answer",
+        **services,
+        **told,
+    )
     root.tick_once()
     return root
 
@@ -43,7 +51,7 @@ def test_a_detection_is_a_yes_and_a_look_at_all_is_needed_for_a_no(context, publ
     root = answer_of(context, scripts, **more)
     assert (root.status, root.answer, root.message, root.cause) == (S, answer, message, None)
     assert context.board.get("alice/q/answer") is answer
-    told = {"node": "alice/q", "question": "hammer in the workshop", "answer": answer, "message": message}
+    told = {"node": "alice/q", "question": "is there a hammer in the workshop", "answer": answer, "message": message}
     assert published == [("answer", told)]
 
 

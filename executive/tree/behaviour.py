@@ -4,10 +4,10 @@ A page of `executive.tree.nodes` defines a kind of node as a class with a `kind`
 are the options of the node's spec, and objects of the run: `child` or `children`, `context`, any field of the context.
 
 Suspending a tree changes no status and no memory: a composite stays at its child, a retry at its attempt. Only running
-nodes that are `Suspendable` stop; each continues when it is ticked the next time. Time that passes while a node is
-suspended does not count against its limit.
+`Suspendable` nodes stop, and continue when they are ticked next. The time in between counts against no limit.
 """
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -377,9 +377,10 @@ def failed_for_good(node: Behaviour) -> bool:
 
 
 def message_of(node: Behaviour) -> str:
-    """Returns the node's message; for a node of py_trees its feedback message, else its name and status."""
+    """Returns the node's message without full stop; for a node of py_trees its feedback, else its name and status."""
     message = node.message if isinstance(node, Explained) else node.feedback_message
-    return message or f"{node.name} {'failed' if node.status == Status.FAILURE else 'goes on'}"
+    ended = "failed" if node.status == Status.FAILURE else "goes on"
+    return re.sub(r"(?<!\.)\.$", "", message) or f"{node.name} {ended}"
 
 
 @runtime_checkable

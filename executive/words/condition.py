@@ -169,12 +169,8 @@ class Not(Strict):
     part: Annotated[Condition, Field(alias="not", description="This does not hold.")]
 
     def __str__(self) -> str:
-        match self.part:
-            case Look():
-                return f"no {self.part}"
-            case ValueIs(text=text) if text.isidentifier():
-                return f"not {text}"
-        return f"not ({self.part})"
+        text = str(self.part)
+        return f"no {text}" if isinstance(self.part, Look) else f"not {text if text.isidentifier() else f'({text})'}"
 
 
 _KEYS: Final[Mapping[str, type[Strict]]] = MappingProxyType(

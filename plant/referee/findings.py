@@ -177,20 +177,17 @@ def judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
         if region is not None:
             (there if is_sure else aside).append(f"{name} {verb} {on} {the(region.name)}")
     most = len(there) + len(aside)
-    if told is None or isinstance(told, bool):
-        there_is = told != condition.negated
-        right = told is not None and (most >= condition.needed if there_is else len(there) < condition.needed)
-    else:
-        right = told <= most and (condition.at_least or told >= len(there))
+    right = told is not None and told <= most and (condition.at_least or told >= len(there))
+    if isinstance(told, bool):
+        right = most >= condition.needed if told != condition.negated else len(there) < condition.needed
     return Finding(right, f"{said(condition)}, and {' and '.join((*there, *aside)) or nothing}.")
 
 
 def said(condition: GoalCondition) -> str:
     """Words for the answer that a condition is about: yes, no, nothing, 2 or at least 2, with its question."""
     number = f"at least {condition.answer}" if condition.at_least else str(condition.answer)
-    told = {"True": "yes", "False": "no", "None": "nothing"}.get(number, number)
     asked = condition.question and f' to "{condition.question}"'
-    return f"the answer{asked} was {told}"
+    return f"the answer{asked} was " + {"True": "yes", "False": "no", "None": "nothing"}.get(number, number)
 
 
 _Places = Callable[[float, float], Iterable[FloatArray | None]]

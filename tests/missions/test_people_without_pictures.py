@@ -30,4 +30,4 @@ def test_somebody_in_a_room_is_not_denied_for_want_of_good_pictures(fault, says,
     options = {"sentence": "is anybody in the hall", "scenario": Scenario((fault,))}
     end = PlantMission(tmp_path, 9441, change=stands_in_hall, **options).end("asked")
     assert (end.claimed, end.cause) == (False, "EXECUTION"), end.message
-    assert "no answer for hall: " in end.message and says in end.message
+    assert "no answer for the hall: " in end.message and says in end.message

@@ -126,18 +126,18 @@ def _answers(
     below = f"{part.path_id}/"
     told = [(one, one.answer) for one in result.findings if f"{one.path_id}/".startswith(below)]
     answers = [(one, answer) for one, answer in told if isinstance(answer, int)]
-    looks = {node.path_id: looks_of(node) for node in result.tree.root.walk()}
+    nodes = {node.path_id: node for node in result.tree.root.walk()}
     for one, answer in answers:
         begun_s = max((each.began_s for each in executions if each.began_s <= one.t_s), default=one.t_s)
         took = [each for each in result.executions if begun_s <= each.began_s <= one.t_s]
         looked_s = tuple(
             (name, each.began_s, min(_end(each), one.t_s))
-            for name, leaves in looks.get(one.path_id, {}).items()
+            for name, leaves in looks_of(nodes[one.path_id]).items()
             for each in took
             if each.path_id in leaves
         )
-        given = replace(condition, question=one.question, answer=answer, at_least=one.at_least)
-        yield replace(given, answered_s=one.t_s, looked_s=looked_s)
+        given = replace(condition, question=one.question, answer=answer, at_least=one.at_least, looked_s=looked_s)
+        yield replace(given, answered_s=one.t_s, negated=bool(nodes[one.path_id].options.get("negated")))
     if not answers and any(one.done for one in executions):
         yield condition
 

@@ -17,7 +17,6 @@ from executive.tree.nodes.search import (
     place_phrase,
     refuse_several,
     search_plan,
-    set_answer_options,
     surfaces_elsewhere,
     surfaces_first_known,
 )
@@ -103,7 +102,14 @@ def _giving(assembler: Assembler, step: Do | Say, node: NodeSpec, builder: PlanB
             raise InputError.at(step.source, f"this step gives {said}, not '{port}'", hint=hint)
         kind, span = (float, COUNTED) if port == "count" or command.object_count == 0 else (bool, None)
         keys["count_key" if port == "count" else "key"] = assembler.give(name, builder.key(port), kind, builder, span)
-    return set_answer_options(node, keys) if keys else node
+    return _with_answer_options(node, keys) if keys else node
+
+
+def _with_answer_options(node: NodeSpec, keys: dict[str, str]) -> NodeSpec:
+    """Sets options of the node that answers a question, such as the key for the answer."""
+    if node.behaviour.answers:
+        return node.with_options(**keys)
+    return replace(node, children=tuple(_with_answer_options(child, keys) for child in node.children))
 
 
 def _in_usual_place(builder: PlanBuilder) -> bool:

@@ -287,27 +287,24 @@ def decide_plan(flow: Flow, condition: Condition, builder: PlanBuilder) -> tuple
     Raises InputError for an expression that is no truth value, an unknown name, or an object that no look can find.
     """
     decision, key, words = decision_of(flow, condition, builder), builder.key("decided"), str(condition)
-    looks = [look_plan(builder, number, look, answer) for number, (answer, look) in enumerate(decision.looks, start=1)]
+    looks = [look_plan(builder.at(f"look-{n}"), look, key) for n, (key, look) in enumerate(decision.looks, start=1)]
     nodes = (node for node, _ in looks)
     node = builder.node("decide", f"{words}?", *nodes, decision=decision, words=words, key=key)
     return node, key, tuple(part for _, part in looks)
 
 
 def look_plan(
-    builder: PlanBuilder, number: int, look: Look | DoorOpen, key: str, *, negated: bool = False
+    builder: PlanBuilder, look: Look | DoorOpen, key: str, *, negated: bool = False
 ) -> tuple[NodeSpec, StepPart]:
     """Plans a look whose answer is that something is so, or not if `negated`; returns its node, and its step."""
-    below = builder.at(f"look-{number}")
     if isinstance(look, DoorOpen):
-        plan = door_plan(below, look.between, key, look.max_age_s, negated=negated)
+        plan = door_plan(builder, look.between, key, look.max_age_s, negated=negated)
         check = next(node for node in plan.walk() if node.behaviour.answers)
-        door = door_goal(builder.knowledge, look.between)
-        return plan, StepPart(check.path_id, goal=replace(door, negated=negated))
-    below = replace(below, command=look.command)
-    refuse_several(below)
+        return plan, StepPart(check.path_id, goal=door_goal(builder.knowledge, look.between))
+    builder = replace(builder, command=look.command)
+    refuse_several(builder)
     goal = command_goal(look.command, builder.knowledge)
-    goal = goal and replace(goal, negated=negated)
-    return find_plan(below, key, negated=negated), StepPart(below.path_id, look.command, goal=goal)
+    return find_plan(builder, key, negated=negated), StepPart(builder.path_id, look.command, goal=goal)
 
 
 def decision_of(flow: Flow, condition: Condition, builder: PlanBuilder) -> Decision:
@@ -354,9 +351,8 @@ class Check(ExplainedDecorator):
         if status == Status.SUCCESS:
             answer = self.context.board.get(self.key) != self.negated
             self.context.board.put(self.key, answer)
-            question = self.name.removesuffix("?")
-            note = {"node": self.path_id, "question": question, "answer": answer, "message": self.message}
-            self.context.publish(ANSWER_TOPIC, note)
+            note = {"question": self.name.removesuffix("?"), "answer": answer, "message": self.message}
+            self.context.publish(ANSWER_TOPIC, {"node": self.path_id, **note})
         return status
 
 
@@ -365,7 +361,7 @@ def _plan(assembler: Assembler, block: model.Check, builder: PlanBuilder) -> Ass
     look = condition.part if (negated := isinstance(condition, Not)) else condition
     if isinstance(look, Look | DoorOpen) and not look.max_age_s:
         key = assembler.give(name, below.at("look-1").key("answer"), bool, builder)
-        node, part = look_plan(below, 1, look, key, negated=negated)
+        node, part = look_plan(below.at("look-1"), look, key, negated=negated)
         return Assembled((node,), (part,))
     decide, key, parts = decide_plan(assembler.flow, condition, below)
     key = assembler.give(name, key, bool, builder)

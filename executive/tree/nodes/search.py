@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from types import MappingProxyType
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviour import Explained, ExplainedDecorator
+from executive.tree.behaviour import Explained, ExplainedDecorator, cause_of, message_of
 from executive.tree.board import Board, FromBoard, SurfaceOfDetection
 from executive.tree.context import ANSWER_TOPIC
 from executive.tree.goals import surfaces_left_out, surfaces_to_search
@@ -23,7 +23,7 @@ from executive.words.task import Part
 from skills.api import Cause, Failed, ObjectKind, Publish, Surface
 from skills.descriptions import SAME_WITHIN_M, count_of, count_sentence, describe_unknown, distinct_objects, plural
 from skills.geometry import compose
-from skills.inputs.errors import listing, with_article
+from skills.inputs.errors import definite, listing, with_article
 from skills.robot import Pose2D
 
 Ports = Mapping[str, object]
@@ -69,7 +69,7 @@ class Answer(ExplainedDecorator):
 
     kind = "answer"
     answers = True
-    output_types: ClassVar = {"key": bool, "count_key": float}
+    output_types: ClassVar = {"count_key": float}
     affirmed: str
     denied: str
     looks: Mapping[str, Sequence[str]]
@@ -86,6 +86,11 @@ class Answer(ExplainedDecorator):
     related: str = ""
     negated: bool = False
     answer: int | None = field(default=None, init=False)
+
+    @classmethod
+    def writes(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Returns the types of the answer, which may be a number, and of the count."""
+        return {options["key"]: float if options.get("numeric") else bool, **super().writes(options)}
 
     def answered(self) -> int | None:
         """Returns the answer."""
@@ -106,17 +111,16 @@ class Answer(ExplainedDecorator):
         status = self.pass_on()
         if status == Status.RUNNING:
             return status
-        nodes = {node.path_id: node for node in self.iterate() if isinstance(node, Explained)}
         unseen = [surface for surface, leaves in self.looks.items() if len(looked(self, leaves)) < len(leaves)]
         if self.tallies:
-            return self._counted(nodes, unseen)
+            return self._counted(unseen)
         if status == Status.FAILURE and unseen:
-            return self._not_looked(nodes, unseen)
+            return self._not_looked(unseen)
         answer = status == Status.SUCCESS
         return self._answered(answer, self.message if answer and self.tells else "")
 
-    def _counted(self, nodes: Mapping[str, Explained], unseen: Sequence[str]) -> Status:
-        done = {leaf for leaf, node in nodes.items() if node.status == Status.SUCCESS}
+    def _counted(self, unseen: Sequence[str]) -> Status:
+        done = {one.path_id for one in self.iterate() if isinstance(one, Explained) and one.status == Status.SUCCESS}
         found = distinct_objects(self.board.get(key, ()) for key in self.tallies.values())
         unknown = distinct_objects(self.board.get(key) for leaf, key in self.doubts.items() if leaf in done)
         unknown = tuple(u for u in unknown if all(math.dist(u.position_W, f.position_W) > SAME_WITHIN_M for f in found))
@@ -125,28 +129,30 @@ class Answer(ExplainedDecorator):
             self.board.put(self.count_key, float(len(found)))
         if not enough and is_least:
             unsure = (f"{one.surface}" for one in unknown if one.surface not in unseen)
-            return self._not_looked(nodes, (*unseen, *dict.fromkeys(unsure)))
-        limits = f"; not all was seen in: {', '.join(unseen)}" if unseen else ""
+            return self._not_looked((*unseen, *dict.fromkeys(unsure)))
+        limits = f"; not all was seen in {listing(map(definite, unseen))}" if unseen else ""
         limits += f"; besides, {listing(map(describe_unknown, unknown))}" if unknown else ""
         told = f"{count_sentence(found, (), at_least=is_least)}{self.related}{limits}" if found else ""
         return self._answered(len(found) if self.numeric else enough, told, is_least and self.numeric)
 
-    def _not_looked(self, nodes: Mapping[str, Explained], unseen: Sequence[str]) -> Status:
-        causes = (node.cause for node in nodes.values() if node.cause is not Cause.POSTCONDITION)
-        cause = next(filter(None, causes), Cause.EXECUTION)
-        return self.fail(Failed(cause, f"no answer for {', '.join(unseen)}: {self.message}"))
+    def _not_looked(self, unseen: Sequence[str]) -> Status:
+        branches = tuple(f"{leaf.rpartition('/')[0]}/" for name in unseen for leaf in self.looks.get(name, ()))
+        below = (one for one in self.iterate() if isinstance(one, Explained) and one.path_id.startswith(branches))
+        first = next((one for one in below if one.cause not in (None, Cause.POSTCONDITION)), self)
+        why = self.message if message_of(first) in self.message else f"{message_of(first)}, and {self.message}"
+        cause = Cause.EXECUTION if first is self else cause_of(first)
+        return self.fail(Failed(cause, f"no answer for {listing(map(definite, unseen))}: {why}"))
 
     def _answered(self, answer: int, found: str, is_least: bool = False) -> Status:
         text = self.affirmed if answer else self.denied
-        self.answer = answer = answer if self.numeric else bool(answer) != self.negated
-        self.cause = None
+        answer = answer if self.numeric else bool(answer) != self.negated
+        self.answer, self.cause = answer, None
         if self.yes_or_no:
             text = f"{'yes' if answer else 'no'}: {text}"
         self.message = found if found and self.numeric else "; ".join(filter(None, (text, found)))
         self.board.put(self.key, float(answer) if self.numeric else answer)
-        question = self.name.removesuffix("?")
-        note = {"node": self.path_id, "question": question, "answer": answer, "message": self.message}
-        self.publish(ANSWER_TOPIC, note | ({"at_least": True} if is_least else {}))
+        note = {"question": self.name.removesuffix("?"), "answer": answer, "message": self.message}
+        self.publish(ANSWER_TOPIC, {"node": self.path_id, **note, **({"at_least": True} if is_least else {})})
         return Status.SUCCESS
 
 
@@ -364,9 +370,7 @@ def required_surfaces(builder: PlanBuilder, item: ObjectKind, place: str | None)
 
 def place_phrase(knowledge: Knowledge, place: str | None) -> str:
     """Text of a place at the end of a sentence: "in the kitchen", "on the desk"."""
-    if place is None:
-        return "anywhere"
-    return f"{'on' if place in knowledge.tops else 'in'} the {place}"
+    return "anywhere" if place is None else f"{'on' if place in knowledge.tops else 'in'} the {place}"
 
 
 def find_plan(builder: PlanBuilder, answer_key: str | None = None, *, negated: bool = False) -> NodeSpec:
@@ -389,17 +393,15 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None, *, negated: b
         related = "".join(f" {relation}" for relation in item.relations)
         what, asked = str(item), _asked_for(str(item.plain), command.object_count) + related
         absent = str(item) if command.object_count == 1 else asked
-        whole_room = place is None or place in knowledge.rooms
-        extra = {"floor": whole_room, "count": 0 if counting or item.relations else 1}
+        floor, count = place is None or place in knowledge.rooms, 0 if counting or item.relations else 1
+        extra = {"floor": floor, "count": count}
         surfaces = required_surfaces(builder, item, place)
         looks = look_plans(builder.at("search"), item, surfaces, key, extra, tallied=counting)
     below = builder.at("search")
     title = f"look for {what if what == ANYTHING else asked}"
     search = below.node("round" if counting else "selector", title, *(look for _, look in looks))
     outputs = {leaf.path_id: leaf.options["outputs"] for _, look in looks for leaf in look.children[1:] if counting}
-    tallies, doubts = (
-        {p: keys[port] for p, keys in outputs.items() if port in keys} for port in (_TALLY, _UNEXPLAINED)
-    )
+    tallies, doubts = ({p: o[port] for p, o in outputs.items() if port in o} for port in (_TALLY, _UNEXPLAINED))
     spot, counts = place_phrase(knowledge, place), answer_key is None and command.object_count == 0
     denial = "{} is not" if person in knowledge.people else "not {}" if command.object_count > 1 else "no {}"
     denied = f"{denial.format(absent)} {spot}"
@@ -431,16 +433,7 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None, *, negated: b
 
 def _asked_for(item: str, count: int) -> str:
     """Text for the object that a question is about: "a beer", "two beers", or "beers" for any number."""
-    if count == 1:
-        return with_article(item)
-    return count_of(count, item) if count else plural(item)
-
-
-def set_answer_options(node: NodeSpec, keys: Mapping[str, str]) -> NodeSpec:
-    """Sets options of the node that answers a question, such as the key for the answer."""
-    if node.behaviour.answers:
-        return node.with_options(**keys)
-    return replace(node, children=tuple(set_answer_options(child, keys) for child in node.children))
+    return with_article(item) if count == 1 else count_of(count, item) if count else plural(item)
 
 
 def refuse_several(builder: PlanBuilder) -> None:

@@ -8,7 +8,6 @@ from py_trees.common import Status
 
 from errand_home.facts import FACTS_FILE, facts_of
 from errand_home.orders import ORDERS, Order, order_of
-from executive.tree.behaviour import Explained
 from executive.tree.board import FromBoard
 from executive.tree.context import ANSWER_TOPIC
 from executive.tree.node import NodeSpec
@@ -46,9 +45,9 @@ class Comparison(Answer):
     weights: Mapping[str, float] = field(default_factory=dict)
     text: str = ""
 
-    def _counted(self, nodes: Mapping[str, Explained], unseen: Sequence[str]) -> Status:
+    def _counted(self, unseen: Sequence[str]) -> Status:
         if unseen:
-            return self._not_looked(nodes, unseen)
+            return self._not_looked(unseen)
         found, unknown = (
             distinct_objects(self.board.get(key, ()) for key in keys.values()) for keys in (self.tallies, self.doubts)
         )

@@ -89,7 +89,7 @@ def test_a_comparison_names_what_comes_first(context, published, found, superlat
             Cause.PRECONDITION,
             "the weight of the apple is not known",
         ),
-        ("SP", [["apple"]], "biggest", {}, Cause.PLANNING, "no answer for desk"),
+        ("SP", [["apple"]], "biggest", {}, Cause.PLANNING, "no answer for the desk"),
     ],
 )
 def test_a_comparison_that_is_not_certain_fails(context, scripts, found, superlative, weights, cause, says):

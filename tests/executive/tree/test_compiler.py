@@ -228,7 +228,7 @@ def test_a_count_of_people_in_a_room_that_was_not_seen_whole_is_the_least_number
     script.ends["find_people"] = lambda skill: Failed(Cause.EXECUTION, "one may be hidden", outputs)
     robot = run_tree(compiled("Take [Nothing] to [kitchen] and do [find] to [some person]")).worst
     assert list(robot.answers.values()) == answers
-    told = "there are at least two people in the kitchen; not all was seen in: kitchen"
+    told = "there are at least two people in the kitchen; not all was seen in the kitchen"
     assert [(one.answer, one.at_least, one.sentence) for one in robot.findings] == [
         (each, True, told) for each in answers
     ]

@@ -4,7 +4,7 @@ from functools import partial
 
 import pytest
 
-from executive.tree.nodes.composites import MemoryRound, MemorySelector
+from executive.tree.nodes.composites import MemoryRound, MemorySelector, MemorySequence
 from executive.tree.nodes.search import Answer
 from skills.api import Cause, ObjectKind, ObjectObservation
 from tests.executive.tree.scripted import CAUSES, F, Leaf, S
@@ -64,6 +64,36 @@ def test_no_is_not_said_when_a_view_was_missed(context, published, obstacle, at)
     assert ("alice/q/answer" in context.board, published) == (False, [])
 
 
+class Says(Leaf):
+    """Leaf that ends with a message."""
+
+    def __init__(self, script, name, said):
+        super().__init__(script, name)
+        self.said = said
+
+    def update(self):
+        status = super().update()
+        self.message = self.said
+        return status
+
+
+# the drive to a view ("": it succeeds), the look -> cause and reason
+@pytest.mark.parametrize(
+    ("drive", "look", "cause", "why"),
+    [
+        ("The door is closed, so no path leads there.", "20% was never in view", Cause.PLANNING, "{}, and {}"),
+        ("", "20% was never in view", Cause.EXECUTION, "{1}"),
+    ],
+)
+def test_no_answer_names_the_place_and_what_kept_the_robot_from_it(context, drive, look, cause, why):
+    go = Says("P" if drive else "S", "q/office/go", drive)
+    near = MemorySelector(path_id="q/office/near", name="near", children=[go, Leaf("S", "q/office/stay")])
+    views = MemorySequence(path_id="q/office", name="views", children=[near, Says("F", "q/office/detect", look)])
+    root = asked(context, views, {"office": ["alice/q/office/detect"]}, "hammer in the office")
+    said = why.format(drive.rstrip("."), look)
+    assert (root.status, root.cause, root.message) == (F, cause, f"no answer for the office: {said}")
+
+
 def beer(x_m, surface):
     return ObjectObservation(0.0, ObjectKind("beer"), (x_m, 0.0, 0.8), (0.1, 0.1, 0.1), 0.0, 0.9, surface)
 
@@ -89,7 +119,7 @@ def count_of(context, seen, needed, **more):
         ((0.0,), (2.0,), 2, True, "; there are two beers on the bench and the trolley"),
         ((0.0,), "O", 2, False, "; there is one beer on the bench"),
         ("O", "O", 1, False, ""),
-        ((0.0,), "P", 1, True, "; there is at least one beer on the bench; not all was seen in: trolley"),
+        ((0.0,), "P", 1, True, "; there is at least one beer on the bench; not all was seen in the trolley"),
     ],
 )
 def test_objects_are_counted_over_all_surfaces(context, bench, trolley, needed, answer, told):
@@ -132,7 +162,7 @@ def test_too_few_is_not_said_while_something_is_unexplained(context):
     doubts = {f"alice/q/{name}": f"alice/q/{name}/unexplained" for name in ("bench", "trolley")}
     root = count_of(context, ((0.0,), "O"), 2, doubts=doubts)
     assert (root.status, root.answer, root.cause) == (F, None, Cause.EXECUTION)
-    assert "no answer for bench" in root.message
+    assert "no answer for the bench" in root.message
     assert count_of(context, ((0.0,), (3.0,)), 2, doubts=doubts).answer is True  # another look recognised it
 
 
@@ -140,4 +170,4 @@ def test_too_few_is_not_said_while_something_is_unexplained(context):
 def test_too_few_is_not_said_when_a_surface_was_missed(context, bench, needed):
     root = count_of(context, (bench, "P"), needed)
     assert (root.status, root.answer, root.cause) == (F, None, Cause.PLANNING)
-    assert "no answer for trolley" in root.message
+    assert "no answer for the trolley" in root.message

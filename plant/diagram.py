@@ -48,6 +48,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from plant.events import add_panel
 from plant.models.person_arms import Arms
+from plant.models.person_figure import Figure
 from plant.rendering import Scene
 from plant.robots.robot_kind import PlacedRobot, RobotBody, robot_kind
 from plant.sensors.ray_shapes import outlines_W
@@ -221,7 +222,7 @@ class LooseModel:
     """A model added to the world at the start: X_WM is the pose of its base.
 
     A fixed model is welded there. A walking person has a `route`, moves upright in x, y and yaw, and passes through
-    fixed shapes. A person who takes objects from robots is `receiving` and has a tray.
+    fixed shapes. A person who takes objects from robots is `receiving` and has a tray. A `figure` replaces the file.
     """
 
     name: str
@@ -230,6 +231,7 @@ class LooseModel:
     fixed: bool = False
     route: PointRoute | None = None
     receiving: Receiving | None = None
+    figure: Figure | None = None
 
 
 @dataclass(frozen=True)
@@ -302,8 +304,12 @@ def build_diagram(config: DiagramConfig, meshcat: Meshcat | None = None) -> Worl
     walkers = [instances[model.name] for model in config.models if model.route is not None]
     moved = [*panels.values(), *walkers, *(tray.model_instance() for tray in trays.values())]
     _filter_collisions(plant, scene_graph, robots.values(), moved)
-    bodies = [plant.get_body(plant.GetBodyIndices(instances[name])[0]) for name in trays]
-    arms = Arms(builder, plant, scene_graph, [*zip(bodies, trays.values(), strict=True)])
+    people = [
+        (plant.get_body(plant.GetBodyIndices(instances[model.name])[0]), trays.get(model.name), model.figure)
+        for model in config.models
+        if model.receiving is not None or model.figure is not None
+    ]
+    arms = Arms(builder, plant, scene_graph, people)
     if meshcat is not None:
         MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
     diagram = builder.Build()
@@ -356,7 +362,10 @@ def parser_of(plant: MultibodyPlant) -> Parser:
 
 
 def _add_model(plant: MultibodyPlant, parser: Parser, model: LooseModel) -> ModelInstanceIndex:
-    instance = add_model(parser, model.path)
+    if model.figure is None:
+        instance = add_model(parser, model.path)
+    else:
+        instance = _only(parser.AddModelsFromString(model.figure.sdf(), "sdf"))
     plant.RenameModelInstance(instance, model.name)
     (index,) = plant.GetBodyIndices(instance)[:1]
     frame = plant.get_body(index).body_frame()

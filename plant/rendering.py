@@ -84,20 +84,20 @@ class Scene:
         if self._cameras:
             self._aside = _Renderer(self, self._cameras)
 
-    def picture(self, positions: NDArray[np.float64], camera: int, *, depth: bool) -> NDArray[Any]:
+    def picture(self, positions: NDArray[np.float64], camera: int, *, depth: bool, time_s: float = 0.0) -> NDArray[Any]:
         """Renders a camera's picture (H, W, 3) RGB, or its depth (H, W) in m, 0 or infinite out of range.
 
         Raises RuntimeError when the rendering process has ended.
         """
         if self._aside is not None:
-            return self._aside.picture(positions, camera, depth=depth)
-        query, one = self.query_at(positions), self._cameras[camera]
+            return self._aside.picture(positions, camera, depth=depth, time_s=time_s)
+        query, one = self.query_at(positions, time_s), self._cameras[camera]
         if depth:
             return np.array(query.RenderDepthImage(one.depth, one.frame, one.X_FC).data[..., 0])
         return np.ascontiguousarray(query.RenderColorImage(one.colour, one.frame, one.X_FC).data[..., :3])
 
-    def query_at(self, positions: NDArray[np.float64]) -> QueryObject:
-        """Returns the scene with the plant at `positions`; it is valid until the next call.
+    def query_at(self, positions: NDArray[np.float64], time_s: float = 0.0) -> QueryObject:
+        """Returns the scene with the plant at `positions`, and gestures at a time; it is valid until the next call.
 
         The first call creates the renderer, which loads all meshes. Without a graphics card it draws in the calling
         thread, unless the environment says otherwise: for small pictures, other threads cost as much as the drawing.
@@ -106,6 +106,7 @@ class Scene:
             self._rendering = True
             os.environ.setdefault(MESA_THREADS, "0")
             self._scene_graph.AddRenderer(self._geometry_context, RENDERER, MakeRenderEngineVtk(self._parameters))
+        self._root_context.SetTime(time_s)
         self._plant.SetPositions(self._context, positions)
         self._pose(self._root_context)
         query = self._query_port.Eval(self._geometry_context)
@@ -128,10 +129,10 @@ class _Renderer:
         theirs.close()
         weakref.finalize(self, _end, self._connection, process)
 
-    def picture(self, positions: NDArray[np.float64], camera: int, *, depth: bool) -> NDArray[Any]:
+    def picture(self, positions: NDArray[np.float64], camera: int, *, depth: bool, time_s: float) -> NDArray[Any]:
         """See `Scene.picture`."""
         try:
-            self._connection.send_bytes(bytes([depth, camera]) + positions.tobytes())
+            self._connection.send_bytes(bytes([depth, camera]) + np.append(positions, time_s).tobytes())
             trouble = self._connection.recv_bytes()
         except (EOFError, OSError) as error:
             raise RuntimeError("the process that renders the cameras' pictures has ended") from error
@@ -154,7 +155,8 @@ class _Renderer:
             while True:
                 depth, camera, *_ = request = connection.recv_bytes()
                 try:
-                    shown = scene.picture(np.frombuffer(request[2:]), camera, depth=bool(depth))
+                    *positions, time_s = np.frombuffer(request[2:])
+                    shown = scene.picture(np.array(positions), camera, depth=bool(depth), time_s=time_s)
                     self._shared(camera, depth=bool(depth))[:] = shown
                     connection.send_bytes(b"")
                 except Exception as error:

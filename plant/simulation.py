@@ -190,5 +190,5 @@ def _loose(placement: Placement) -> LooseModel:
 
 def _person(placement: Placement) -> LooseModel:
     """The model of a person; a standing person is welded to the world, at no cost in a step."""
-    route = placement.route
-    return replace(_loose(placement), fixed=route is None, route=route, receiving=placement.receiving)
+    route, figure = placement.route, placement.figure
+    return replace(_loose(placement), fixed=route is None, route=route, receiving=placement.receiving, figure=figure)

@@ -1,11 +1,11 @@
-"""Arms of people who receive objects: they hang, and hold the tray when it is out. They are only seen.
+"""Arms of people: they hang, make gestures, and hold the tray when it is out. They are only seen.
 
 No contact, range or joint knows the arms, and the stepped context never moves them. A renderer calls `Arms.pose` after
 it has set the plant's positions.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -31,13 +31,27 @@ _OUT_M = 0.3
 """Horizontal distance of the tray from the person's axis from which on the hands hold it."""
 
 
-def arm_poses(side: str, X_PT: RigidTransform | None = None) -> tuple[RigidTransform, RigidTransform]:
+class Gesturing(Protocol):
+    """Figure of a person who moves the arms, whose trunk has the pose X_PT in the person's frame."""
+
+    @property
+    def X_PT(self) -> RigidTransform:
+        """Pose of the trunk frame in the person's."""
+
+    def hand(self, side: float, time_s: float) -> FloatArray:
+        """Position (3,) of a hand in the trunk frame; `side` is 1 for the left one, -1 for the right one."""
+
+
+def arm_poses(
+    side: str, X_PT: RigidTransform | None = None, hand: FloatArray | None = None
+) -> tuple[RigidTransform, RigidTransform]:
     """Poses of the upper and the lower arm of a side in the person's frame; both point along -z.
 
-    The hand hangs, or goes to the tray at X_PT as the tray leaves the torso. It points at a tray out of reach.
+    The hand hangs, or is at `hand`, or goes to the tray at X_PT as the tray leaves the torso. It points at what is out
+    of reach.
     """
     mirror = np.array([1.0, SIDES[side], 1.0])
-    shoulder, hand = mirror * _SHOULDER, mirror * _HANGING
+    shoulder, hand = mirror * _SHOULDER, mirror * _HANGING if hand is None else hand
     if X_PT is not None:
         out = min(1.0, float(np.linalg.norm(X_PT.translation()[:2])) / _OUT_M)
         hand = hand + out * (X_PT @ (mirror * _GRIP) - hand)
@@ -70,46 +84,50 @@ def _copy_parameter(context: Context, output: AbstractValue) -> None:
 
 
 class Arms:
-    """Movable arms of the people who have a tray, if their model has the fixed arms that these replace."""
+    """Movable arms of the people who have a tray or a figure, if their model has the fixed arms that these replace."""
 
     def __init__(
         self,
         builder: DiagramBuilder,
         plant: MultibodyPlant,
         scene_graph: SceneGraph,
-        people: Sequence[tuple[RigidBody, RigidBody]],
+        people: Sequence[tuple[RigidBody, RigidBody | None, Gesturing | None]],
     ) -> None:
-        """Replaces the fixed arms of the people, each given with the tray, before the Diagram is built."""
+        """Replaces the fixed arms of people, each given with tray and figure, before the Diagram is built."""
         self._plant, self._frames = plant, dict[str, FrameId]()
-        self._arms = list[tuple[str, str, str, RigidBody, RigidBody]]()
+        self._arms = list[tuple[str, tuple[str, str], RigidBody, RigidBody | None, Gesturing | None]]()
         source, inspector = scene_graph.RegisterSource("arms"), scene_graph.model_inspector()
         poses = FramePoseVector()
-        for body, tray in people:
+        for body, tray, figure in people:
             fixed = {inspector.GetName(each).split("::")[-1]: each for each in plant.GetVisualGeometriesForBody(body)}
             for side in (side for side in SIDES if f"{side}_lower_arm" in fixed):
-                names = list[str]()
-                for part in (f"{side}_upper_arm", f"{side}_lower_arm"):
-                    name = f"{int(tray.model_instance())}_{part}"
-                    names.append(name)
+                upper, lower = (f"{int(body.index())}_{side}_{part}_arm" for part in ("upper", "lower"))
+                for name, part in ((upper, f"{side}_upper_arm"), (lower, f"{side}_lower_arm")):
                     self._frames[name] = frame = scene_graph.RegisterFrame(source, GeometryFrame(name))
-                    arm = GeometryInstance(RigidTransform(), inspector.GetShape(fixed[part]), name)
-                    arm.set_illustration_properties(inspector.GetIllustrationProperties(fixed[part]))
-                    arm.set_perception_properties(inspector.GetPerceptionProperties(fixed[part]))
-                    scene_graph.RegisterGeometry(source, frame, arm)
                     poses.set_value(frame, RigidTransform())
-                    for role in (Role.kIllustration, Role.kPerception):
-                        scene_graph.RemoveRole(plant.get_source_id(), fixed[part], role)
-                self._arms.append((side, names[0], names[1], body, tray))
+                    for each in (fixed[each] for each in fixed if each.startswith(part)):
+                        X_AG = RigidTransform() if figure is None else inspector.GetPoseInFrame(each)
+                        arm = GeometryInstance(X_AG, inspector.GetShape(each), f"{each.get_value()}_{name}")
+                        arm.set_illustration_properties(inspector.GetIllustrationProperties(each))
+                        arm.set_perception_properties(inspector.GetPerceptionProperties(each))
+                        scene_graph.RegisterGeometry(source, frame, arm)
+                        for role in (Role.kIllustration, Role.kPerception):
+                            scene_graph.RemoveRole(plant.get_source_id(), each, role)
+                self._arms.append((side, (upper, lower), body, tray, figure))
         self._poses = builder.AddNamedSystem("arms", _source_of(Value[FramePoseVector](poses)))
         builder.Connect(self._poses.get_output_port(), scene_graph.get_source_pose_port(source))
 
     def poses(self, plant_context: Context) -> Mapping[str, RigidTransform]:
         """Poses X_WA of the arms by the names of their frames, as the people and the trays stand."""
-        poses = dict[str, RigidTransform]()
-        for side, upper, lower, body, tray in self._arms:
-            X_WP, X_WT = (self._plant.EvalBodyPoseInWorld(plant_context, each) for each in (body, tray))
-            X_PU, X_PL = arm_poses(side, X_WP.inverse() @ X_WT)
-            poses |= {upper: X_WP @ X_PU, lower: X_WP @ X_PL}
+        poses, time_s = dict[str, RigidTransform](), plant_context.get_time()
+        for side, names, body, tray, figure in self._arms:
+            X_WP = X_WT = self._plant.EvalBodyPoseInWorld(plant_context, body)
+            hand = X_PT = None
+            if tray is not None:
+                X_PT = X_WP.inverse() @ self._plant.EvalBodyPoseInWorld(plant_context, tray)
+            if figure is not None:
+                hand, X_WT = figure.hand(SIDES[side], time_s), X_WP @ figure.X_PT
+            poses |= {name: X_WT @ X_TA for name, X_TA in zip(names, arm_poses(side, X_PT, hand), strict=True)}
         return poses
 
     def pose(self, root_context: Context) -> None:

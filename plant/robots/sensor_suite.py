@@ -88,7 +88,7 @@ class Camera(NoisySensor):
         lens, colour = self.spec.intrinsics(), None
         if visual:
             self._work[f"pictures_{lens.width}x{lens.height}"] += 1
-            colour = self._picture.colour(self._scene.picture(positions, self._number, depth=False))
+            colour = self._picture.colour(self._scene.picture(positions, self._number, depth=False, time_s=stamp_s))
         grey = _NO_PICTURE if colour is None else np.asarray(cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
         return Image(
             stamp_s=stamp_s,
@@ -98,16 +98,18 @@ class Camera(NoisySensor):
             depth_intrinsics=self.spec.depth_intrinsics(),
             colour=colour if self.spec.colour else None,
             grey=grey,
-            depth_m=self._take_depth(self._scene, positions, grey) if depth else _NO_DEPTH,
+            depth_m=self._take_depth(self._scene, positions, grey, stamp_s) if depth else _NO_DEPTH,
             frames=frames,
         )
 
-    def _take_depth(self, scene: Scene, positions: FloatArray, grey: NDArray[np.uint8]) -> NDArray[np.float32]:
+    def _take_depth(
+        self, scene: Scene, positions: FloatArray, grey: NDArray[np.uint8], time_s: float
+    ) -> NDArray[np.float32]:
         """Renders noisy depth; too dark and too shiny spots of the picture are lost, if there is one."""
         lens = self.spec.depth_intrinsics()
         small = np.asarray(cv2.resize(grey, (lens.width, lens.height)), dtype=np.uint8) if grey.size else None
         self._work[f"depth_pictures_{lens.width}x{lens.height}"] += 1
-        return self._depth.depth(scene.picture(positions, self._number, depth=True), small)
+        return self._depth.depth(scene.picture(positions, self._number, depth=True, time_s=time_s), small)
 
 
 _DOCKED_WITHIN_M = 0.2

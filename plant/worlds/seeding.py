@@ -15,7 +15,8 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from executive.words.mission import Route, Stop
 from plant.models.catalogue import ModelClass, ModelForm, load_catalogue
-from plant.worlds.world import Lengths, ObjectRule, PersonRule, Point, SurfaceTop, World, WorldError
+from plant.models.person_figure import Figure, shade
+from plant.worlds.world import Lengths, ObjectRule, PersonRule, Point, Spot, SurfaceTop, World, WorldError
 from skills.robot import FloatArray
 
 
@@ -118,6 +119,7 @@ _OBJECT_STREAM = 1
 _PEOPLE_STREAM = 2
 _FORM_STREAM = 3
 _WALK_STREAM = 13
+_FIGURE_STREAM = 16
 
 
 @dataclass(frozen=True)
@@ -133,7 +135,8 @@ class Placement:
     """A model in the world: X_WO is its pose at the start.
 
     A loose object rests on `surface`. A person without a `route` is welded to the world. `receiving` says how the
-    person takes objects. `answers` maps phrases in questions to the person's answers.
+    person takes objects; a `figure` has another posture, gesture or clothes than the form. `answers` maps phrases in
+    questions to the person's answers.
     """
 
     name: str
@@ -143,6 +146,7 @@ class Placement:
     surface: str | None = None
     route: PointRoute | None = None
     receiving: Receiving | None = None
+    figure: Figure | None = None
     answers: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -231,9 +235,10 @@ def _place_person(world: World, rule: PersonRule, form: ModelForm, seed: int, in
     stream = (seed, _WALK_STREAM, index)
     route = None if rule.route is None else point_route(rule.route, world.standing, stream)
     rng = np.random.default_rng([seed, _PEOPLE_STREAM, index])
+    spot = Spot(x=0.0, y=0.0)
     if rule.stands:
-        pose = rule.stands[int(rng.integers(len(rule.stands)))]
-        x, y, yaw = pose.x, pose.y, pose.yaw
+        spot = rule.stands[int(rng.integers(len(rule.stands)))]
+        x, y, yaw = spot.x, spot.y, spot.yaw
     elif rule.ranges is not None:
         x, y, yaw = _before_start(world, rule.ranges, rng)
     else:
@@ -241,9 +246,24 @@ def _place_person(world: World, rule: PersonRule, form: ModelForm, seed: int, in
         (x, y), yaw = route.stops[0].at_W, route.first_yaw_rad
     if route is not None and (rule.stands or rule.ranges):
         route = route.from_pose((x, y), yaw)
-    X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([x, y, form.rest_height_m], dtype=np.float64))
-    receiving = Receiving(rule.pull_n, rule.reaction_s) if rule.receives else None
-    return Placement(rule.name, rule.model, form, X_WO, route=route, receiving=receiving, answers=rule.answers)
+    X_WO = RigidTransform(
+        RollPitchYaw(0.0, 0.0, yaw), np.array([x, y, form.rest_height_m + spot.z_m], dtype=np.float64)
+    )
+    takes = rule.receives and spot.posture == "standing"
+    receiving = Receiving(rule.pull_n, rule.reaction_s) if takes else None
+    figure = _figure(rule, spot, np.random.default_rng([seed, _FIGURE_STREAM, index]))
+    return Placement(rule.name, rule.model, form, X_WO, None, route, receiving, figure, rule.answers)
+
+
+def _figure(rule: PersonRule, spot: Spot, rng: np.random.Generator) -> Figure | None:
+    """Figure of a person, with gesture, colour and shade by the seed; None where the form shows the person as well."""
+    gestures, colours = rule.gestures or ("none",), rule.clothes
+    gesture, number = gestures[int(rng.integers(len(gestures)))], int(rng.integers(max(1, len(colours))))
+    if not rule.gestures and not colours and spot.posture == "standing":
+        return None
+    figure = Figure(spot.posture, "none" if spot.posture == "lying" else gesture)
+    figure = replace(figure, phase_rad=float(rng.uniform(0.0, math.tau)))
+    return replace(figure, clothes=shade(colours[number], rng)) if colours else figure
 
 
 def _before_start(

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from executive.words.knowledge import Knowledge, Pose
 from executive.words.mission import Route, Stop
 from plant.models.catalogue import ImportedObject, load_catalogue, read_imported
+from plant.models.person_figure import SEAT_M, Clothes, Gesture, Posture
 from plant.worlds.geometry_files import check_directives, check_model
 from skills.inputs.errors import InputError, nearest_name, suggestion
 from skills.inputs.outside import is_file
@@ -73,6 +74,19 @@ class ObjectRule(_Strict):
     surfaces: tuple[str, ...] = Field(min_length=1, description="surfaces of knowledge.yaml; the seed chooses one")
 
 
+class Spot(Pose):
+    """A pose of a person on the floor, on a seat or on a bed. Who lies has the feet ahead, and makes no gesture."""
+
+    posture: Posture = Field(default="standing", description="standing, sitting or lying")
+    top: quantities.Margin | None = Field(default=None, description="height of the seat or bed, m")
+
+    @property
+    def z_m(self) -> float:
+        """Height of the person's origin: that of a bed, or what a seat is higher than the usual one."""
+        usual_m = SEAT_M if self.posture == "sitting" else 0.0
+        return 0.0 if self.top is None else self.top - usual_m
+
+
 class PersonRule(_Strict):
     """A person who walks on a route, or stands at a pose or within three ranges in front of the robot's start pose.
 
@@ -81,13 +95,15 @@ class PersonRule(_Strict):
 
     name: str = Field(description="the person's name in knowledge.yaml")
     model: str = Field(default="person", description="a class of `plant/models/catalogue.yaml`")
-    pose: Pose | None = Field(default=None, description="where the person stands, and the direction that they face")
-    poses: tuple[Pose, ...] = Field(default=(), description="poses instead, of which the seed chooses one")
+    pose: Spot | None = Field(default=None, description="where the person stands, and the direction that they face")
+    poses: tuple[Spot, ...] = Field(default=(), description="poses instead, of which the seed chooses one")
     distance_m: Distances | None = Field(default=None, description="least and greatest distance from the start pose")
     bearing_rad: Angles | None = Field(default=None, description="least and greatest bearing, seen from the start pose")
     turned_rad: Angles | None = Field(default=None, description="least and greatest turn away from facing the robot")
     route: Route | None = Field(default=None, description="where the person walks")
-    receives: bool = Field(default=True, description="whether the person takes offered objects")
+    gestures: tuple[Gesture, ...] = Field(default=(), description="gestures, of which the seed chooses one")
+    clothes: tuple[Clothes, ...] = Field(default=(), description="colours of clothes, of which the seed chooses one")
+    receives: bool = Field(default=True, description="whether the person takes offered objects, while standing")
     answers: dict[str, str] = Field(default={}, description="answers to the robot's questions by a part of their text")
     pull_n: Pull = Field(default=15.0, description="the person's pull at an offered object, N")
     reaction_s: Reaction = Field(default=1.0, description="how long an offered object must be still before, s")
@@ -99,10 +115,12 @@ class PersonRule(_Strict):
             raise ValueError("'pose' says where the person stands; leave out 'distance_m', 'bearing_rad', 'turned_rad'")
         if self.route is None and not self.stands and self.ranges is None:
             raise ValueError("give 'pose', or 'route', or 'distance_m', 'bearing_rad' and 'turned_rad'")
+        if self.route is not None and any(spot.posture != "standing" for spot in self.stands):
+            raise ValueError("a person with a 'route' stands at first; leave out 'posture'")
         return self
 
     @property
-    def stands(self) -> tuple[Pose, ...]:
+    def stands(self) -> tuple[Spot, ...]:
         """Poses of which the seed chooses one; a single one where the file has `pose`."""
         return self.poses if self.pose is None else (self.pose,)
 
@@ -216,7 +234,7 @@ class World:
         """
         rules = self.seed_rules
         before = {rule.name: rule for rule in rules.people}
-        kept = {"receives", "pull_n", "reaction_s", "answers"}
+        kept = {"receives", "pull_n", "reaction_s", "answers", "gestures", "clothes"}
         manners = {name: rule.model_dump(include=kept) for name, rule in before.items()}
         walking = {n: PersonRule(name=n, route=route, **manners.get(n, {})) for n, route in routes.items()}
         changed = rules.model_copy(update={"people": tuple({**before, **walking}.values())})

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from pydrake.math import RollPitchYaw
 
-from executive.words.knowledge import Pose
 from executive.words.mission import Route
 from plant.models.catalogue import load_catalogue
 from plant.worlds.seeding import outline_W, place_objects, place_people, polygon_distance, standing_W
-from plant.worlds.world import PersonRule, WorldError, load_world
+from plant.worlds.world import PersonRule, Spot, WorldError, load_world
 from skills.robot import Pose2D
 
 SEEDS = range(51)
@@ -102,7 +101,7 @@ def test_the_person_stands_before_the_robot_and_looks_at_it(world):
 
 
 def test_a_person_with_a_pose_stands_and_faces_as_it_says_and_walks_from_there(world):
-    kim = PersonRule(name="Kim", pose=Pose(x=4.0, y=4.4, yaw=1.0))
+    kim = PersonRule(name="Kim", pose=Spot(x=4.0, y=4.4, yaw=1.0))
     walks = kim.model_copy(update={"name": "Noor", "route": Route(waypoints=("kitchen",))})
     moved = dataclasses.replace(world, seed_rules=world.seed_rules.model_copy(update={"people": (kim, walks)}))
     stands, sets_off = place_people(moved, 3)
@@ -112,7 +111,7 @@ def test_a_person_with_a_pose_stands_and_faces_as_it_says_and_walks_from_there(w
 
 
 def test_the_seed_chooses_one_of_a_persons_poses(world):
-    kim = PersonRule(name="Kim", poses=(Pose(x=4.0, y=4.4, yaw=1.0), Pose(x=3.0, y=4.4, yaw=0.0)))
+    kim = PersonRule(name="Kim", poses=(Spot(x=4.0, y=4.4, yaw=1.0), Spot(x=3.0, y=4.4, yaw=0.0)))
     moved = dataclasses.replace(world, seed_rules=world.seed_rules.model_copy(update={"people": (kim,)}))
     chosen = [float(place_people(moved, seed)[0].X_WO.translation()[0]) for seed in range(12)]
     assert {*chosen} == {3.0, 4.0}

@@ -288,7 +288,7 @@ def standing_points_W(world: World) -> FloatArray:
 def standing_W(world: World, rule: PersonRule) -> list[Point]:
     """Points where a person may start under any seed: one, or a grid over the person's ranges."""
     if rule.stands:
-        return [(pose.x, pose.y) for pose in rule.stands]
+        return [(spot.x, spot.y) for spot in rule.stands if spot.posture == "standing"]
     if rule.ranges is None:
         assert rule.route is not None
         return [point_route(rule.route, world.standing).stops[0].at_W] if rule.route.waypoints else []
@@ -315,7 +315,7 @@ def overlaps(
         own = shapely.MultiPoint(standing_W(world, rule))
         walks_on = rule.route is not None and (rule.route.loop or rule.route.wanders or rule.route.follows is not None)
         for name, shape in (*solid, *(() if walks_on else before)):
-            if shapely.dwithin(own, shape, BODY_RADIUS_M):
+            if not own.is_empty and shapely.dwithin(own, shape, BODY_RADIUS_M):
                 x, y = shapely.shortest_line(own, shape).coords[0]
                 yield rule, f"{rule.name} would stand in {name} at ({x:.2f}, {y:.2f})"
                 break

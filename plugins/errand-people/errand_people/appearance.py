@@ -1,0 +1,276 @@
+"""Perception of a person's pose, gesture and colour of clothes, from pictures with depth of one camera at rest.
+
+The head of an upright person is a blob as wide as a head above shoulders; its height tells who stands and who sits. Points
+beside the head, or far beside the shoulders, are an arm; face and hair tell which. Who lies is a long, low body.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform
+from scipy import ndimage
+
+from errand_people.looks import Appearance, Colour, Gesture, Pose
+from skills.perception.point_cloud import PointCloud, camera_pose_W, cloud_from_image, project
+from skills.robot import FloatArray, Image
+
+PICTURES_S: Final = (0.0, 0.3, 0.6, 0.9, 1.2)
+"""Times of the pictures of a look, in which a waving hand goes there and back."""
+HEIGHTS_M: Final = (1.2, 0.45)
+"""Heights at which the camera looks, the second one for people who do not stand or sit."""
+_AROUND_M, _CELL_M, _STRIDE = 1.2, 0.05, 3
+_HEAD_M, _HEAD_WIDTH_M = 0.20, (0.10, 0.25)
+_STANDS_M, _SITS_M = (1.52, 2.1), (0.98, 1.46)
+"""Heights of the top of the head of people who stand, and who sit."""
+_LONG_M, _WIDE_M, _THICK_M = (1.2, 2.1), 0.95, (0.06, 0.45)
+"""Length, largest width, and heights of a body above the bed or floor on which it lies."""
+_FEWEST: Final = 12
+_STILL_M, _MOVES_M = 0.05, 0.09
+"""Largest motion of a hand that is at rest, and least of one that waves."""
+_NOT_SIDEWAYS_M: Final = 0.07
+_ARM_M: Final = 0.95
+"""Largest distance of a hand from the axis of the head."""
+_DARK, _LIGHT, _PALE, _VIVID, _PREVAILS = 58, 188, 55, 85, 0.6
+"""Limits of black, white, grey and vivid colours (0 to 255), and the least share of the colour that prevails."""
+_HUES: Final[dict[Colour, tuple[int, int]]] = {
+    "red": (172, 5),
+    "orange": (7, 18),
+    "yellow": (21, 35),
+    "green": (40, 88),
+    "blue": (96, 132),
+}
+"""Ranges of hue, of 180, from one colour to the next."""
+
+
+@dataclass(frozen=True)
+class _Head:
+    """Top of a head (m), and the vertical axis (x, y) through it."""
+
+    top_m: float
+    axis_W: FloatArray
+
+
+class Look:
+    """A look at a person near a place (x, y): pictures from one position of the robot, the camera lower if need be."""
+
+    def __init__(self, place_W: Sequence[float] | FloatArray) -> None:
+        self.place_W = np.asarray(place_W, dtype=np.float64)
+        self.result, self._looks = Appearance(), 0
+
+    @property
+    def next_height_m(self) -> float | None:
+        """Height of the point at which the camera is to look next; None when the look is over."""
+        return None if self.result.pose is not None or self._looks == len(HEIGHTS_M) else HEIGHTS_M[self._looks]
+
+    def add(self, images: Sequence[Image], X_WO: RigidTransform) -> None:
+        """Adds a series of pictures from one pose, of which the first has colour."""
+        found, place_W = appearance_of(images, X_WO, self.place_W)
+        self._looks += 1
+        if found.pose is not None:
+            self.result, self.place_W = found, place_W
+
+
+def appearance_of(images: Sequence[Image], X_WO: RigidTransform, place_W: FloatArray) -> tuple[Appearance, FloatArray]:
+    """Appearance of the person near a place (x, y), and the axis of their head or the middle of their body (x, y)."""
+    camera_W = camera_pose_W(images[0], X_WO).translation()
+    clouds = [_cloud(image, X_WO, place_W) for image in images]
+    head = _head(clouds[0].p_W, place_W, camera_W)
+    if head is None:
+        body = _lying(clouds[0], place_W)
+        if body is None:
+            return Appearance(), place_W
+        return Appearance("lying", "none", _colour(body)), np.asarray(body.p_W[:, :2].mean(axis=0))
+    off = clouds[0].p_W - [*head.axis_W, head.top_m]
+    r = np.hypot(off[:, 0], off[:, 1])
+    torso = clouds[0].where((r < 0.25) & (off[:, 2] > -0.74) & (off[:, 2] < -0.42))
+    gesture = _gesture(clouds, head, camera_W) if _shows_arms(images[0], X_WO, head, camera_W) else None
+    return Appearance(_upright(head.top_m), gesture, _colour(torso)), head.axis_W
+
+
+def _cloud(image: Image, X_WO: RigidTransform, place_W: FloatArray) -> PointCloud:
+    """Points around a place, of every third row and column of the depth."""
+    lens = image.depth_intrinsics
+    if not image.grey.size:
+        image = replace(image, grey=np.zeros((image.intrinsics.height, image.intrinsics.width), np.uint8))
+    thin = np.zeros_like(image.depth_m)
+    thin[::_STRIDE, ::_STRIDE] = image.depth_m[::_STRIDE, ::_STRIDE]
+    cloud = cloud_from_image(replace(image, depth_m=thin, depth_intrinsics=lens), X_WO, heights_m=(0.03, 2.4))
+    return cloud.where(np.linalg.norm(cloud.p_W[:, :2] - place_W, axis=1) < _AROUND_M)
+
+
+def _head(p_W: FloatArray, place_W: FloatArray, camera_W: FloatArray) -> _Head | None:
+    """Highest blob of a head's size above shoulders, near a place; None when there is none."""
+    high = p_W[p_W[:, 2] > _SITS_M[0]]
+    if not len(high):
+        return None
+    along = place_W - camera_W[:2]
+    along /= np.linalg.norm(along)
+    across = np.array([along[1], -along[0]])
+    cells = np.floor(high[:, :2] / _CELL_M).astype(np.int64)
+    _, index = np.unique(cells, axis=0, return_inverse=True)
+    tops = ndimage.maximum_position(high[:, 2], index.ravel(), np.arange(index.max() + 1))
+    for row in sorted((int(each[0]) for each in tops), key=lambda row: -high[row, 2]):
+        x, y, top_m = high[row]
+        off = p_W - [x, y, top_m]
+        r = np.hypot(off[:, 0], off[:, 1])
+        u = off[:, :2] @ across
+        crown = (r < _HEAD_M) & (off[:, 2] > -0.22)
+        if np.any(off[(r < 0.12), 2] > 0.02) or np.count_nonzero(crown) < _FEWEST:
+            continue
+        low, high_u = np.percentile(u[crown], (3, 97))
+        middle = 0.5 * (low + high_u)
+        shoulders = (np.abs(u - middle) < 0.36) & (r < 0.42) & (off[:, 2] < -0.32) & (off[:, 2] > -0.52)
+        belly = (np.abs(u - middle) < 0.36) & (r < 0.42) & (off[:, 2] < -0.52) & (off[:, 2] > -0.75)
+        if not _HEAD_WIDTH_M[0] < high_u - low < _HEAD_WIDTH_M[1]:
+            continue
+        if min(np.count_nonzero(shoulders), np.count_nonzero(belly)) < 2 * _FEWEST:
+            continue
+        wide = np.percentile(u[shoulders] - middle, (3, 97))
+        if wide[1] - wide[0] < 0.2 or abs(wide.mean()) > 0.16 or abs(np.median(u[belly]) - middle) > 0.11:
+            continue
+        depth = np.median(off[crown][:, :2] @ along)
+        axis_W = np.array([x, y]) + middle * across + (depth + 0.06) * along
+        if np.linalg.norm(axis_W - place_W) < 0.6:
+            return _Head(float(top_m), axis_W)
+    return None
+
+
+def _upright(top_m: float) -> Pose | None:
+    """Pose of a person by the height of the top of the head."""
+    if _STANDS_M[0] < top_m < _STANDS_M[1]:
+        return "standing"
+    return "sitting" if _SITS_M[0] < top_m < _SITS_M[1] else None
+
+
+def _shows_arms(image: Image, X_WO: RigidTransform, head: _Head, camera_W: FloatArray) -> bool:
+    """Returns whether a picture shows what is beside and above a head, with nothing in front."""
+    along = (head.axis_W - camera_W[:2]) / np.linalg.norm(head.axis_W - camera_W[:2])
+    across = np.array([along[1], -along[0]])
+    corners = [
+        [*(head.axis_W + side * across), head.top_m + up] for side in (-0.5, 0.0, 0.5) for up in (-0.4, -0.2, 0.05)
+    ]
+    p_C = camera_pose_W(image, X_WO).inverse().multiply(np.array(corners).T).T
+    lens = image.depth_intrinsics
+    u, v = (each.astype(int) for each in project(p_C, lens))
+    if np.any((u < 0) | (u >= lens.width) | (v < 0) | (v >= lens.height)):
+        return False
+    window = image.depth_m[v.min() : v.max() + 1, u.min() : u.max() + 1]
+    return bool(np.mean((window > 0.0) & (window < p_C[:, 2].mean() - 0.75)) < 0.05)
+
+
+def _gesture(clouds: Sequence[PointCloud], head: _Head, camera_W: FloatArray) -> Gesture | None:
+    """Gesture of a person from several clouds; None when it is not sure."""
+    forward = _facing(clouds[0], head, camera_W)
+    hands, pointing = list[FloatArray](), list[FloatArray]()
+    for cloud in clouds:
+        off = _connected(cloud.p_W, head) - [*head.axis_W, head.top_m]
+        r = np.hypot(off[:, 0], off[:, 1])
+        up = off[(off[:, 2] > -0.18) & (r > 0.19)]
+        aside = off[(off[:, 2] > -0.58) & (off[:, 2] < -0.18) & (r > 0.47)]
+        if len(up) >= _FEWEST:
+            hands.append(up.mean(axis=0))
+        elif len(aside) >= _FEWEST:
+            pointing.append(aside.mean(axis=0))
+    if not hands and not pointing:
+        return "none"
+    if max(len(hands), len(pointing)) < len(clouds):
+        return None
+    arm = np.array(hands or pointing)
+    if hands and (motion_m := float(np.ptp(arm, axis=0).max())) > _STILL_M:
+        return "waving" if motion_m > _MOVES_M else None
+    if forward is None or abs(left_m := float(arm[:, :2].mean(axis=0) @ [-forward[1], forward[0]])) < _NOT_SIDEWAYS_M:
+        return None
+    left_m = float(arm[:, :2].mean(axis=0) @ [-forward[1], forward[0]])
+    if hands:
+        return "raising_left_arm" if left_m > 0 else "raising_right_arm"
+    return "pointing_left" if left_m > 0 else "pointing_right"
+
+
+def _connected(p_W: FloatArray, head: _Head) -> FloatArray:
+    """Points above the hips that belong to a person: to the head or shoulders, or to nothing that is farther away."""
+    off = p_W - [*head.axis_W, head.top_m]
+    r = np.hypot(off[:, 0], off[:, 1])
+    near = (off[:, 2] > -0.62) & (r < _ARM_M + 0.1)
+    p_W, off, r = p_W[near], off[near], r[near]
+    cells = np.floor(off / 0.06).astype(np.int64)
+    cells -= cells.min(axis=0, initial=0)
+    grid = np.zeros(cells.max(axis=0, initial=0) + 1, dtype=bool)
+    grid[tuple(cells.T)] = True
+    labels, _ = ndimage.label(grid, np.ones((3, 3, 3)))
+    of_points = labels[tuple(cells.T)]
+    own = np.setdiff1d(of_points, of_points[r > _ARM_M])
+    return p_W[np.isin(of_points, own) | np.isin(of_points, of_points[r < 0.2])]
+
+
+def _facing(cloud: PointCloud, head: _Head, camera_W: FloatArray) -> FloatArray | None:
+    """Direction (x, y) in which a person looks, from the hair to the face; None without a face in view."""
+    off = cloud.p_W - [*head.axis_W, head.top_m]
+    near = (np.hypot(off[:, 0], off[:, 1]) < 0.17) & (off[:, 2] > -0.22) & (off[:, 2] < -0.05)
+    face = _is_skin(cloud.colours)
+    skin, hair = off[near & face][:, :2], off[near & ~face][:, :2]
+    if len(skin) < 0.15 * (len(skin) + len(hair)) or len(skin) < _FEWEST:
+        return None
+    ahead = skin.mean(axis=0) - hair.mean(axis=0) if len(hair) > _FEWEST / 2 else camera_W[:2] - head.axis_W
+    return np.asarray(ahead / np.linalg.norm(ahead))
+
+
+def _is_skin(colours: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Mask of colours of skin: bright, and of a reddish hue without being vivid."""
+    h, s, v = (each.astype(int) for each in _hsv(colours).T)
+    return np.asarray((h > 2) & (h < 20) & (s > 40) & (s < 150) & (v > 100))
+
+
+def _hsv(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    return np.asarray(cv2.cvtColor(colours.reshape(1, -1, 3), cv2.COLOR_RGB2HSV)[0], dtype=np.uint8)
+
+
+def _lying(cloud: PointCloud, place_W: FloatArray) -> PointCloud | None:
+    """Points of a long, low body near a place; None when there is none."""
+    p_W = cloud.p_W
+    counts, edges = np.histogram(p_W[:, 2], bins=np.arange(0.0, 0.8, 0.02))
+    for k in np.argsort(-counts)[:6]:
+        if counts[k] < 30:
+            break
+        above = p_W[:, 2] - edges[k]
+        rows = np.flatnonzero((above > _THICK_M[0]) & (above < _THICK_M[1]))
+        if len(rows) < 8 * _FEWEST:
+            continue
+        cells = np.floor((p_W[rows, :2] - place_W + 2.0) / 0.06).astype(np.int64)
+        grid = np.zeros((70, 70), dtype=bool)
+        grid[tuple(cells.T)] = True
+        labels, count = ndimage.label(grid, np.ones((3, 3)))
+        of_rows = labels[tuple(cells.T)]
+        for label in range(1, count + 1):
+            own = rows[of_rows == label]
+            flat = p_W[own, :2] - p_W[own, :2].mean(axis=0)
+            if len(own) < 8 * _FEWEST or np.linalg.norm(p_W[own, :2].mean(axis=0) - place_W) > 0.6:
+                continue
+            _, _, axes = np.linalg.svd(flat, full_matrices=False)
+            low, high = np.percentile(flat @ axes.T, (1, 99), axis=0)
+            length_m, width_m = high - low
+            if _LONG_M[0] < length_m < _LONG_M[1] and width_m < _WIDE_M:
+                return cloud.where(np.isin(np.arange(len(p_W)), own))
+    return None
+
+
+def _colour(cloud: PointCloud) -> Colour | None:
+    """Colour of most points of clothes; None when there are too few, or no colour prevails."""
+    if len(cloud) < 4 * _FEWEST:
+        return None
+    h, s, v = (each.astype(int) for each in _hsv(cloud.colours).T)
+    dark, pale = v < _DARK, s < _PALE
+    votes: dict[Colour, float] = {
+        "black": float(np.mean(dark)),
+        "white": float(np.mean(~dark & pale & (v > _LIGHT))),
+        "grey": float(np.mean(~dark & pale & (v < _LIGHT - 20))),
+    }
+    for colour, (low, high) in _HUES.items():
+        hue = (h >= low) & (h <= high) if low < high else (h >= low) | (h <= high)
+        votes[colour] = float(np.mean(~dark & ~pale & (s > _VIVID) & hue))
+    best = max(votes, key=lambda colour: votes[colour])
+    return best if votes[best] > _PREVAILS else None

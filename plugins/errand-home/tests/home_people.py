@@ -2,9 +2,9 @@
 
     python plugins/errand-home/tests/home_people.py [--seed 1] [--people 20] [--jobs 1] [--out FOLDER]
 
-Each seed draws a person with a pose, a gesture and clothes, at a free spot of the world or on a seat or bed. Each is seen
-from three sides at two distances, by the camera of Spot's hand with its noise. `right` and `wrong` are shares of the
-views by trait; the rest is not sure.
+Each seed draws a person with a pose, a gesture and clothes, at a free spot of the world or on a seat or bed. Each is
+seen from three sides at two distances, by the camera of Spot's hand with its noise. `right` and `wrong` are shares of
+the views by trait; the rest is not sure.
 """
 
 import math
@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from errand_people.appearance import PICTURES_S, Look, appearance_of
+from errand_people.appearance import PICTURES_S, Look
 from errand_people.looks import TRAITS
 from executive.app.prepare.worlds import open_world
 from executive.words.outlines import inside
@@ -56,7 +56,10 @@ def viewpoints(rng, ground, world, at, yaw_rad, posture):
     for distance_m in DISTANCES_M:
         for low_rad, high_rad in sides:
             for _ in range(30):
-                away_m, bearing_rad = distance_m + rng.uniform(-AWAY_M, AWAY_M), yaw_rad + rng.uniform(low_rad, high_rad)
+                away_m, bearing_rad = (
+                    distance_m + rng.uniform(-AWAY_M, AWAY_M),
+                    yaw_rad + rng.uniform(low_rad, high_rad),
+                )
                 step = np.array([math.cos(bearing_rad), math.sin(bearing_rad)])
                 camera, body = at + away_m * step, at + (away_m + BEHIND_M) * step
                 if all(inside(room, each) for each in (camera, body)) and ground._clear_m(body[None])[0] > CLEAR_M:

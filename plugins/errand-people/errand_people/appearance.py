@@ -1,10 +1,9 @@
 """Perception of a person's pose, gesture and colour of clothes, from pictures with depth of one camera at rest.
 
-The head of an upright person is a blob as wide as a head above shoulders; its height tells who stands and who sits. Points
-beside the head, or far beside the shoulders, are an arm; face and hair tell which. Who lies is a long, low body.
+The head of an upright person is a blob as wide as a head above shoulders; its height tells who stands and who sits.
+Points beside the head, or far beside the shoulders, are an arm; face and hair tell which. Who lies is long and low.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -25,17 +24,25 @@ HEIGHTS_M: Final = (1.2, 0.45)
 """Heights at which the camera looks, the second one for people who do not stand or sit."""
 _AROUND_M, _CELL_M, _STRIDE = 1.2, 0.05, 3
 _HEAD_M, _HEAD_WIDTH_M = 0.20, (0.10, 0.25)
-_STANDS_M, _SITS_M = (1.52, 2.1), (0.98, 1.46)
+_NARROW_M, _ASIDE_M, _NEAR_M, _BEHIND_M = 0.2, 0.16, 0.6, 0.06
+"""Least width of shoulders, how far the torso's middle may be beside the head's, and the head from the expected place;
+how far its axis is behind its surface."""
+_HIGHER: Final = 0.4
+"""Part of its height by which a blob may be farther beside its shoulders than a lower one."""
+_STANDS_M, _SITS_M = (1.57, 2.1), (0.98, 1.51)
 """Heights of the top of the head of people who stand, and who sit."""
-_LONG_M, _WIDE_M, _THICK_M = (1.2, 2.1), 0.95, (0.06, 0.45)
+_LONG_M, _WIDE_M, _THICK_M = (1.2, 2.1), 0.95, (0.12, 0.45)
 """Length, largest width, and heights of a body above the bed or floor on which it lies."""
 _FEWEST: Final = 12
 _STILL_M, _MOVES_M = 0.05, 0.09
 """Largest motion of a hand that is at rest, and least of one that waves."""
 _NOT_SIDEWAYS_M: Final = 0.07
-_ARM_M: Final = 0.95
-"""Largest distance of a hand from the axis of the head."""
-_DARK, _LIGHT, _PALE, _VIVID, _PREVAILS = 58, 188, 55, 85, 0.6
+_ARM_M, _ARM_MOVES_M, _UP_M, _THIN_M = 0.95, 0.45, -0.18, 0.25
+"""Largest distance of a hand from the axis of the head, its largest motion, the height from which it is raised, and
+the largest thickness of an arm that is held out."""
+_ALIKE: Final = 22.0
+"""Largest difference of colours (CIE Lab, lightness less) of the same clothes."""
+_DARK, _LIGHT, _PALE, _VIVID, _PREVAILS = 58, 170, 55, 85, 0.6
 """Limits of black, white, grey and vivid colours (0 to 255), and the least share of the colour that prevails."""
 _HUES: Final[dict[Colour, tuple[int, int]]] = {
     "red": (172, 5),
@@ -84,7 +91,7 @@ def appearance_of(images: Sequence[Image], X_WO: RigidTransform, place_W: FloatA
         body = _lying(clouds[0], place_W)
         if body is None:
             return Appearance(), place_W
-        return Appearance("lying", "none", _colour(body)), np.asarray(body.p_W[:, :2].mean(axis=0))
+        return Appearance("lying", "none", _colour(body[1])), np.asarray(body[0].p_W[:, :2].mean(axis=0))
     off = clouds[0].p_W - [*head.axis_W, head.top_m]
     r = np.hypot(off[:, 0], off[:, 1])
     torso = clouds[0].where((r < 0.25) & (off[:, 2] > -0.74) & (off[:, 2] < -0.42))
@@ -104,8 +111,8 @@ def _cloud(image: Image, X_WO: RigidTransform, place_W: FloatArray) -> PointClou
 
 
 def _head(p_W: FloatArray, place_W: FloatArray, camera_W: FloatArray) -> _Head | None:
-    """Highest blob of a head's size above shoulders, near a place; None when there is none."""
-    high = p_W[p_W[:, 2] > _SITS_M[0]]
+    """Blob of a head's size high above shoulders, near a place; None when there is none."""
+    high = p_W[(p_W[:, 2] > _SITS_M[0]) & (p_W[:, 2] < _STANDS_M[1])]
     if not len(high):
         return None
     along = place_W - camera_W[:2]
@@ -114,30 +121,30 @@ def _head(p_W: FloatArray, place_W: FloatArray, camera_W: FloatArray) -> _Head |
     cells = np.floor(high[:, :2] / _CELL_M).astype(np.int64)
     _, index = np.unique(cells, axis=0, return_inverse=True)
     tops = ndimage.maximum_position(high[:, 2], index.ravel(), np.arange(index.max() + 1))
-    for row in sorted((int(each[0]) for each in tops), key=lambda row: -high[row, 2]):
-        x, y, top_m = high[row]
-        off = p_W - [x, y, top_m]
-        r = np.hypot(off[:, 0], off[:, 1])
-        u = off[:, :2] @ across
-        crown = (r < _HEAD_M) & (off[:, 2] > -0.22)
-        if np.any(off[(r < 0.12), 2] > 0.02) or np.count_nonzero(crown) < _FEWEST:
+    best: tuple[float, _Head] | None = None
+    for row in (int(each[0]) for each in tops):
+        off = p_W - high[row]
+        r, u, z = np.hypot(off[:, 0], off[:, 1]), off[:, :2] @ across, off[:, 2]
+        crown = (r < _HEAD_M) & (z > -0.22)
+        if np.any(z[r < 0.12] > 0.02) or np.count_nonzero(crown) < _FEWEST:
             continue
-        low, high_u = np.percentile(u[crown], (3, 97))
-        middle = 0.5 * (low + high_u)
-        shoulders = (np.abs(u - middle) < 0.36) & (r < 0.42) & (off[:, 2] < -0.32) & (off[:, 2] > -0.52)
-        belly = (np.abs(u - middle) < 0.36) & (r < 0.42) & (off[:, 2] < -0.52) & (off[:, 2] > -0.75)
-        if not _HEAD_WIDTH_M[0] < high_u - low < _HEAD_WIDTH_M[1]:
+        ends = np.percentile(u[crown], (3, 97))
+        beside = np.abs(u - ends.mean())
+        shoulders = (beside < 0.36) & (r < 0.42) & (z < -0.32) & (z > -0.52)
+        torso = (beside < 0.36) & (r < 0.42) & (z < -0.42) & (z > -0.7)
+        if not _HEAD_WIDTH_M[0] < ends[1] - ends[0] < _HEAD_WIDTH_M[1]:
             continue
-        if min(np.count_nonzero(shoulders), np.count_nonzero(belly)) < 2 * _FEWEST:
+        if min(np.count_nonzero(shoulders), np.count_nonzero(torso)) < 2 * _FEWEST:
             continue
-        wide = np.percentile(u[shoulders] - middle, (3, 97))
-        if wide[1] - wide[0] < 0.2 or abs(wide.mean()) > 0.16 or abs(np.median(u[belly]) - middle) > 0.11:
+        wide = np.percentile(u[shoulders], (3, 97))
+        aside_m = max(abs(wide.mean() - ends.mean()), abs(float(np.median(u[torso])) - ends.mean()))
+        axis_W = high[row, :2] + ends.mean() * across + (np.median(off[crown][:, :2] @ along) + _BEHIND_M) * along
+        if wide[1] - wide[0] < _NARROW_M or aside_m > _ASIDE_M or np.linalg.norm(axis_W - place_W) > _NEAR_M:
             continue
-        depth = np.median(off[crown][:, :2] @ along)
-        axis_W = np.array([x, y]) + middle * across + (depth + 0.06) * along
-        if np.linalg.norm(axis_W - place_W) < 0.6:
-            return _Head(float(top_m), axis_W)
-    return None
+        badness = aside_m - _HIGHER * float(high[row, 2])
+        if best is None or badness < best[0]:
+            best = (badness, _Head(float(high[row, 2]), axis_W))
+    return None if best is None else best[1]
 
 
 def _upright(top_m: float) -> Pose | None:
@@ -164,47 +171,74 @@ def _shows_arms(image: Image, X_WO: RigidTransform, head: _Head, camera_W: Float
 
 
 def _gesture(clouds: Sequence[PointCloud], head: _Head, camera_W: FloatArray) -> Gesture | None:
-    """Gesture of a person from several clouds; None when it is not sure."""
-    forward = _facing(clouds[0], head, camera_W)
-    hands, pointing = list[FloatArray](), list[FloatArray]()
-    for cloud in clouds:
-        off = _connected(cloud.p_W, head) - [*head.axis_W, head.top_m]
-        r = np.hypot(off[:, 0], off[:, 1])
-        up = off[(off[:, 2] > -0.18) & (r > 0.19)]
-        aside = off[(off[:, 2] > -0.58) & (off[:, 2] < -0.18) & (r > 0.47)]
-        if len(up) >= _FEWEST:
-            hands.append(up.mean(axis=0))
-        elif len(aside) >= _FEWEST:
-            pointing.append(aside.mean(axis=0))
-    if not hands and not pointing:
+    """Gesture of a person from several clouds, of which the first has colours; None when it is not sure."""
+    first = _arms(clouds[0], head, _clothes_and_skin(clouds[0], head))
+    later = [_arms(cloud, head, None) for cloud in clouds[1:]]
+    if first is None or any(each is None for each in later):
+        return None
+    if not first:
         return "none"
-    if max(len(hands), len(pointing)) < len(clouds):
+    if len(first) > 1:
         return None
-    arm = np.array(hands or pointing)
-    if hands and (motion_m := float(np.ptp(arm, axis=0).max())) > _STILL_M:
-        return "waving" if motion_m > _MOVES_M else None
-    if forward is None or abs(left_m := float(arm[:, :2].mean(axis=0) @ [-forward[1], forward[0]])) < _NOT_SIDEWAYS_M:
+    (arm,) = first
+    track = [arm]
+    for arms in later:
+        near = [each for each in arms or () if np.linalg.norm(each - arm) < _ARM_MOVES_M]
+        if not near:
+            return None
+        track.append(min(near, key=lambda each: float(np.linalg.norm(each - arm))))
+    motion_m = float(np.ptp(np.array(track), axis=0).max())
+    if motion_m > _STILL_M:
+        return "waving" if motion_m > _MOVES_M and arm[2] > _UP_M else None
+    forward = _facing(clouds[0], head, camera_W)
+    left_m = 0.0 if forward is None else float(arm[:2] @ [-forward[1], forward[0]])
+    if abs(left_m) < _NOT_SIDEWAYS_M:
         return None
-    left_m = float(arm[:, :2].mean(axis=0) @ [-forward[1], forward[0]])
-    if hands:
+    if arm[2] > _UP_M:
         return "raising_left_arm" if left_m > 0 else "raising_right_arm"
     return "pointing_left" if left_m > 0 else "pointing_right"
 
 
-def _connected(p_W: FloatArray, head: _Head) -> FloatArray:
-    """Points above the hips that belong to a person: to the head or shoulders, or to nothing that is farther away."""
-    off = p_W - [*head.axis_W, head.top_m]
+def _arms(cloud: PointCloud, head: _Head, own: NDArray[np.bool_] | None) -> list[FloatArray] | None:
+    """Middles (3,) of what is raised or held out, from the top of the head; None when something may be such an arm.
+
+    Only thin pieces that begin near the body count, and where the points of clothes and skin are known, only those.
+    """
+    off = cloud.p_W - [*head.axis_W, head.top_m]
     r = np.hypot(off[:, 0], off[:, 1])
-    near = (off[:, 2] > -0.62) & (r < _ARM_M + 0.1)
-    p_W, off, r = p_W[near], off[near], r[near]
+    near = np.flatnonzero((off[:, 2] > -0.62) & (r < _ARM_M + 0.1))
+    off, r = off[near], r[near]
     cells = np.floor(off / 0.06).astype(np.int64)
     cells -= cells.min(axis=0, initial=0)
     grid = np.zeros(cells.max(axis=0, initial=0) + 1, dtype=bool)
     grid[tuple(cells.T)] = True
     labels, _ = ndimage.label(grid, np.ones((3, 3, 3)))
     of_points = labels[tuple(cells.T)]
-    own = np.setdiff1d(of_points, of_points[r > _ARM_M])
-    return p_W[np.isin(of_points, own) | np.isin(of_points, of_points[r < 0.2])]
+    up = (off[:, 2] > _UP_M) & (r > 0.19)
+    aside = (off[:, 2] > -0.58) & (off[:, 2] <= _UP_M) & (r > 0.47)
+    found = list[FloatArray]()
+    for label in np.unique(of_points[up | aside]):
+        piece = of_points == label
+        rows = np.flatnonzero(piece & up)
+        if len(rows) < _FEWEST:
+            rows = np.flatnonzero(piece & aside)
+        if len(rows) < _FEWEST or (own is not None and np.mean(own[near[rows]]) < 0.5):
+            continue
+        thin = np.ptp(np.percentile(off[rows, 2], (4, 96))) < _THIN_M or off[rows, 2].min() > _UP_M
+        if own is None or (thin and r[rows].max() < _ARM_M):
+            found.append(off[rows].mean(axis=0))
+        elif np.any(r[piece] < 0.2):
+            return None
+    return found
+
+
+def _clothes_and_skin(cloud: PointCloud, head: _Head) -> NDArray[np.bool_]:
+    """Mask of the points in the colours of a person's skin and upper clothing."""
+    off = cloud.p_W - [*head.axis_W, head.top_m]
+    torso = (np.hypot(off[:, 0], off[:, 1]) < 0.25) & (off[:, 2] > -0.74) & (off[:, 2] < -0.42)
+    lab = cv2.cvtColor(cloud.colours.reshape(1, -1, 3), cv2.COLOR_RGB2LAB)[0].astype(np.float64)
+    alike = np.linalg.norm((lab - np.median(lab[torso], axis=0)) * [0.4, 1.0, 1.0], axis=1) < _ALIKE
+    return np.asarray(alike | _is_skin(cloud.colours))
 
 
 def _facing(cloud: PointCloud, head: _Head, camera_W: FloatArray) -> FloatArray | None:
@@ -229,13 +263,11 @@ def _hsv(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.asarray(cv2.cvtColor(colours.reshape(1, -1, 3), cv2.COLOR_RGB2HSV)[0], dtype=np.uint8)
 
 
-def _lying(cloud: PointCloud, place_W: FloatArray) -> PointCloud | None:
-    """Points of a long, low body near a place; None when there is none."""
+def _lying(cloud: PointCloud, place_W: FloatArray) -> tuple[PointCloud, PointCloud] | None:
+    """Points of a long, low body near a place, and those of its upper clothing; None when there is none."""
     p_W = cloud.p_W
     counts, edges = np.histogram(p_W[:, 2], bins=np.arange(0.0, 0.8, 0.02))
     for k in np.argsort(-counts)[:6]:
-        if counts[k] < 30:
-            break
         above = p_W[:, 2] - edges[k]
         rows = np.flatnonzero((above > _THICK_M[0]) & (above < _THICK_M[1]))
         if len(rows) < 8 * _FEWEST:
@@ -246,16 +278,28 @@ def _lying(cloud: PointCloud, place_W: FloatArray) -> PointCloud | None:
         labels, count = ndimage.label(grid, np.ones((3, 3)))
         of_rows = labels[tuple(cells.T)]
         for label in range(1, count + 1):
-            own = rows[of_rows == label]
-            flat = p_W[own, :2] - p_W[own, :2].mean(axis=0)
-            if len(own) < 8 * _FEWEST or np.linalg.norm(p_W[own, :2].mean(axis=0) - place_W) > 0.6:
+            body = cloud.where(np.isin(np.arange(len(p_W)), rows[of_rows == label]))
+            middle = body.p_W[:, :2].mean(axis=0)
+            if len(body) < 8 * _FEWEST or np.linalg.norm(middle - place_W) > 0.6:
                 continue
-            _, _, axes = np.linalg.svd(flat, full_matrices=False)
-            low, high = np.percentile(flat @ axes.T, (1, 99), axis=0)
-            length_m, width_m = high - low
-            if _LONG_M[0] < length_m < _LONG_M[1] and width_m < _WIDE_M:
-                return cloud.where(np.isin(np.arange(len(p_W)), own))
+            _, _, axes = np.linalg.svd(body.p_W[:, :2] - middle, full_matrices=False)
+            along, across = axes @ (p_W[:, :2] - middle).T
+            own = np.isin(np.arange(len(p_W)), rows[of_rows == label])
+            low, high = np.percentile(along[own], (1, 99))
+            if _LONG_M[0] < high - low < _LONG_M[1] and np.ptp(np.percentile(across[own], (2, 98))) < _WIDE_M:
+                spine = (np.abs(across) < 0.2) & (above > 0.06)
+                return body, cloud.where(spine & _chest(_is_skin(cloud.colours) & spine, along, low, high))
     return None
+
+
+def _chest(skin: NDArray[np.bool_], along: FloatArray, low_m: float, high_m: float) -> NDArray[np.bool_]:
+    """Mask of the points a little below the head, which is at the end with skin; empty where the face is not seen."""
+    from_ends = (along - low_m, high_m - along)
+    shown = [np.count_nonzero(skin & (each < 0.25) & (each > -0.4)) for each in from_ends]
+    if max(shown) < _FEWEST / 2 or min(shown) > 0.5 * max(shown):
+        return np.zeros(len(skin), dtype=bool)
+    from_head = from_ends[int(np.argmax(shown))]
+    return np.asarray((from_head > 0.3) & (from_head < 0.5))
 
 
 def _colour(cloud: PointCloud) -> Colour | None:
@@ -267,7 +311,7 @@ def _colour(cloud: PointCloud) -> Colour | None:
     votes: dict[Colour, float] = {
         "black": float(np.mean(dark)),
         "white": float(np.mean(~dark & pale & (v > _LIGHT))),
-        "grey": float(np.mean(~dark & pale & (v < _LIGHT - 20))),
+        "grey": float(np.mean(~dark & pale & (v < _LIGHT - 12))),
     }
     for colour, (low, high) in _HUES.items():
         hue = (h >= low) & (h <= high) if low < high else (h >= low) | (h <= high)

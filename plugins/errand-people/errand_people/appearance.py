@@ -187,7 +187,7 @@ def _gesture(clouds: Sequence[PointCloud], head: _Head, camera_W: FloatArray) ->
         if not near:
             return None
         track.append(min(near, key=lambda each: float(np.linalg.norm(each - arm))))
-    motion_m = float(np.ptp(np.array(track), axis=0).max())
+    motion_m = float(np.ptp(np.array(track)[:, :2], axis=0).max())
     if motion_m > _STILL_M:
         return "waving" if motion_m > _MOVES_M and arm[2] > _UP_M else None
     forward = _facing(clouds[0], head, camera_W)
@@ -215,7 +215,7 @@ def _arms(cloud: PointCloud, head: _Head, own: NDArray[np.bool_] | None) -> list
     labels, _ = ndimage.label(grid, np.ones((3, 3, 3)))
     of_points = labels[tuple(cells.T)]
     up = (off[:, 2] > _UP_M) & (r > 0.19)
-    aside = (off[:, 2] > -0.58) & (off[:, 2] <= _UP_M) & (r > 0.47)
+    aside = (off[:, 2] > -0.52) & (off[:, 2] <= _UP_M) & (r > 0.47)
     found = list[FloatArray]()
     for label in np.unique(of_points[up | aside]):
         piece = of_points == label

@@ -22,7 +22,7 @@ PICTURES_S: Final = (0.0, 0.3, 0.6, 0.9, 1.2)
 """Times of the pictures of a look, in which a waving hand goes there and back."""
 HEIGHTS_M: Final = (1.2, 0.45)
 """Heights at which the camera looks, the second one for people who do not stand or sit."""
-_AROUND_M, _CELL_M, _STRIDE = 1.2, 0.05, 3
+_AROUND_M, _CELL_M, _STRIDE = 1.5, 0.05, 3
 _HEAD_M, _HEAD_WIDTH_M = 0.20, (0.10, 0.25)
 _NARROW_M, _ASIDE_M, _NEAR_M, _BEHIND_M = 0.2, 0.16, 0.6, 0.06
 """Least width of shoulders, how far the torso's middle may be beside the head's, and the head from the expected place;
@@ -31,8 +31,12 @@ _HIGHER: Final = 0.4
 """Part of its height by which a blob may be farther beside its shoulders than a lower one."""
 _STANDS_M, _SITS_M = (1.57, 2.1), (0.98, 1.51)
 """Heights of the top of the head of people who stand, and who sit."""
-_LONG_M, _WIDE_M, _THICK_M = (1.2, 2.1), 0.95, (0.12, 0.45)
-"""Length, largest width, and heights of a body above the bed or floor on which it lies."""
+_LIES_NEAR_M: Final = 1.0
+"""Largest distance of the middle of a body from a place where its face or hand is seen."""
+_LONG_M, _WIDE_M, _THICK_M = (1.2, 2.1), (0.25, 0.95), (0.12, 0.45)
+"""Lengths, widths, and heights of a body above the bed or floor on which it lies."""
+_SKIN_M, _PATCH_M = (0.05, 1.9), 0.45
+"""Heights of faces and hands, and the largest size of a patch of skin."""
 _FEWEST: Final = 12
 _STILL_M, _MOVES_M = 0.05, 0.09
 """Largest motion of a hand that is at rest, and least of one that waves."""
@@ -99,14 +103,35 @@ def appearance_of(images: Sequence[Image], X_WO: RigidTransform, place_W: FloatA
     return Appearance(_upright(head.top_m), gesture, _colour(torso)), head.axis_W
 
 
-def _cloud(image: Image, X_WO: RigidTransform, place_W: FloatArray) -> PointCloud:
-    """Points around a place, of every third row and column of the depth."""
-    lens = image.depth_intrinsics
-    if not image.grey.size:
-        image = replace(image, grey=np.zeros((image.intrinsics.height, image.intrinsics.width), np.uint8))
+def candidates(image: Image, X_WO: RigidTransform) -> list[tuple[float, float]]:
+    """Places (x, y) of patches of skin in a picture, which may be faces or hands."""
+    cloud = cloud_from_image(_thinned(image), X_WO, heights_m=(_SKIN_M[0], _SKIN_M[1]))
+    p_W = cloud.p_W[_is_skin(cloud.colours)]
+    if not len(p_W):
+        return []
+    cells = np.floor(p_W[:, :2] / _CELL_M).astype(np.int64)
+    cells -= cells.min(axis=0)
+    grid = np.zeros(cells.max(axis=0) + 1, dtype=bool)
+    grid[tuple(cells.T)] = True
+    labels, count = ndimage.label(grid, np.ones((3, 3)))
+    of_points = labels[tuple(cells.T)]
+    patches = [p_W[of_points == label] for label in range(1, count + 1)]
+    small = [patch for patch in patches if len(patch) >= _FEWEST / 2 and np.ptp(patch, axis=0).max() < _PATCH_M]
+    return [(float(x), float(y)) for x, y, _ in (patch.mean(axis=0) for patch in small)]
+
+
+def _thinned(image: Image) -> Image:
+    """Picture with the depth of every third row and column only."""
     thin = np.zeros_like(image.depth_m)
     thin[::_STRIDE, ::_STRIDE] = image.depth_m[::_STRIDE, ::_STRIDE]
-    cloud = cloud_from_image(replace(image, depth_m=thin, depth_intrinsics=lens), X_WO, heights_m=(0.03, 2.4))
+    return replace(image, depth_m=thin)
+
+
+def _cloud(image: Image, X_WO: RigidTransform, place_W: FloatArray) -> PointCloud:
+    """Points around a place, of every third row and column of the depth."""
+    if not image.grey.size:
+        image = replace(image, grey=np.zeros((image.intrinsics.height, image.intrinsics.width), np.uint8))
+    cloud = cloud_from_image(_thinned(image), X_WO, heights_m=(0.03, 2.4))
     return cloud.where(np.linalg.norm(cloud.p_W[:, :2] - place_W, axis=1) < _AROUND_M)
 
 
@@ -280,13 +305,16 @@ def _lying(cloud: PointCloud, place_W: FloatArray) -> tuple[PointCloud, PointClo
         for label in range(1, count + 1):
             body = cloud.where(np.isin(np.arange(len(p_W)), rows[of_rows == label]))
             middle = body.p_W[:, :2].mean(axis=0)
-            if len(body) < 8 * _FEWEST or np.linalg.norm(middle - place_W) > 0.6:
+            if len(body) < 8 * _FEWEST or np.linalg.norm(middle - place_W) > _LIES_NEAR_M:
                 continue
             _, _, axes = np.linalg.svd(body.p_W[:, :2] - middle, full_matrices=False)
             along, across = axes @ (p_W[:, :2] - middle).T
             own = np.isin(np.arange(len(p_W)), rows[of_rows == label])
             low, high = np.percentile(along[own], (1, 99))
-            if _LONG_M[0] < high - low < _LONG_M[1] and np.ptp(np.percentile(across[own], (2, 98))) < _WIDE_M:
+            if (
+                _LONG_M[0] < high - low < _LONG_M[1]
+                and _WIDE_M[0] < np.ptp(np.percentile(across[own], (2, 98))) < _WIDE_M[1]
+            ):
                 spine = (np.abs(across) < 0.2) & (above > 0.06)
                 return body, cloud.where(spine & _chest(_is_skin(cloud.colours) & spine, along, low, high))
     return None

@@ -11,6 +11,7 @@ take their positions as they take those of named people.
 `traits` (those to tell). Ports out: `person`, each trait that was asked for as a word, and `text`, a sentence.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, TypeVar, get_args
 
@@ -38,6 +39,11 @@ class Appearance:
     def traits(self) -> dict[Trait, str]:
         """Returns the traits that are given, by name."""
         return {trait: value for trait in TRAITS if (value := getattr(self, trait)) is not None}
+
+    def only(self, traits: Sequence[Trait]) -> "Appearance":
+        """Returns the appearance with these traits alone."""
+        pose, gesture = (self.pose if "pose" in traits else None), (self.gesture if "gesture" in traits else None)
+        return Appearance(pose, gesture, self.clothes_colour if "clothes_colour" in traits else None)
 
     def unsure_of(self, wanted: "Appearance") -> tuple[Trait, ...]:
         """Traits that another appearance gives and this one does not."""

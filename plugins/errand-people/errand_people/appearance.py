@@ -49,11 +49,11 @@ _ALIKE: Final = 22.0
 _DARK, _LIGHT, _PALE, _VIVID, _PREVAILS = 58, 170, 55, 85, 0.6
 """Limits of black, white, grey and vivid colours (0 to 255), and the least share of the colour that prevails."""
 _HUES: Final[dict[Colour, tuple[int, int]]] = {
-    "red": (172, 5),
-    "orange": (7, 18),
-    "yellow": (21, 35),
-    "green": (40, 88),
-    "blue": (96, 132),
+    Colour.RED: (172, 5),
+    Colour.ORANGE: (7, 18),
+    Colour.YELLOW: (21, 35),
+    Colour.GREEN: (40, 88),
+    Colour.BLUE: (96, 132),
 }
 """Ranges of hue, of 180, from one colour to the next."""
 
@@ -95,7 +95,7 @@ def appearance_of(images: Sequence[Image], X_WO: RigidTransform, place_W: FloatA
         body = _lying(clouds[0], place_W)
         if body is None:
             return Appearance(), place_W
-        return Appearance("lying", "none", _colour(body[1])), np.asarray(body[0].p_W[:, :2].mean(axis=0))
+        return Appearance(Pose.LYING, Gesture.NONE, _colour(body[1])), np.asarray(body[0].p_W[:, :2].mean(axis=0))
     off = clouds[0].p_W - [*head.axis_W, head.top_m]
     r = np.hypot(off[:, 0], off[:, 1])
     torso = clouds[0].where((r < 0.25) & (off[:, 2] > -0.74) & (off[:, 2] < -0.42))
@@ -175,8 +175,8 @@ def _head(p_W: FloatArray, place_W: FloatArray, camera_W: FloatArray) -> _Head |
 def _upright(top_m: float) -> Pose | None:
     """Pose of a person by the height of the top of the head."""
     if _STANDS_M[0] < top_m < _STANDS_M[1]:
-        return "standing"
-    return "sitting" if _SITS_M[0] < top_m < _SITS_M[1] else None
+        return Pose.STANDING
+    return Pose.SITTING if _SITS_M[0] < top_m < _SITS_M[1] else None
 
 
 def _shows_arms(image: Image, X_WO: RigidTransform, head: _Head, camera_W: FloatArray) -> bool:
@@ -202,7 +202,7 @@ def _gesture(clouds: Sequence[PointCloud], head: _Head, camera_W: FloatArray) ->
     if first is None or any(each is None for each in later):
         return None
     if not first:
-        return "none"
+        return Gesture.NONE
     if len(first) > 1:
         return None
     (arm,) = first
@@ -214,14 +214,14 @@ def _gesture(clouds: Sequence[PointCloud], head: _Head, camera_W: FloatArray) ->
         track.append(min(near, key=lambda each: float(np.linalg.norm(each - arm))))
     motion_m = float(np.ptp(np.array(track)[:, :2], axis=0).max())
     if motion_m > _STILL_M:
-        return "waving" if motion_m > _MOVES_M and arm[2] > _UP_M else None
+        return Gesture.WAVING if motion_m > _MOVES_M and arm[2] > _UP_M else None
     forward = _facing(clouds[0], head, camera_W)
     left_m = 0.0 if forward is None else float(arm[:2] @ [-forward[1], forward[0]])
     if abs(left_m) < _NOT_SIDEWAYS_M:
         return None
     if arm[2] > _UP_M:
-        return "raising_left_arm" if left_m > 0 else "raising_right_arm"
-    return "pointing_left" if left_m > 0 else "pointing_right"
+        return Gesture.RAISING_LEFT_ARM if left_m > 0 else Gesture.RAISING_RIGHT_ARM
+    return Gesture.POINTING_LEFT if left_m > 0 else Gesture.POINTING_RIGHT
 
 
 def _arms(cloud: PointCloud, head: _Head, own: NDArray[np.bool_] | None) -> list[FloatArray] | None:
@@ -337,9 +337,9 @@ def _colour(cloud: PointCloud) -> Colour | None:
     h, s, v = (each.astype(int) for each in _hsv(cloud.colours).T)
     dark, pale = v < _DARK, s < _PALE
     votes: dict[Colour, float] = {
-        "black": float(np.mean(dark)),
-        "white": float(np.mean(~dark & pale & (v > _LIGHT))),
-        "grey": float(np.mean(~dark & pale & (v < _LIGHT - 12))),
+        Colour.BLACK: float(np.mean(dark)),
+        Colour.WHITE: float(np.mean(~dark & pale & (v > _LIGHT))),
+        Colour.GREY: float(np.mean(~dark & pale & (v < _LIGHT - 12))),
     }
     for colour, (low, high) in _HUES.items():
         hue = (h >= low) & (h <= high) if low < high else (h >= low) | (h <= high)

@@ -13,16 +13,53 @@ take their positions as they take those of named people.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Literal, TypeVar, get_args
+from enum import StrEnum
+from typing import Final, TypeVar
 
 from skills.quantities import Coordinate
 
-Pose = Literal["standing", "sitting", "lying"]
-Gesture = Literal["waving", "raising_left_arm", "raising_right_arm", "pointing_left", "pointing_right", "none"]
-"""Left and right are the person's own; `none` is a person whose arms hang."""
-Colour = Literal["red", "orange", "yellow", "green", "blue", "white", "grey", "black"]
-Trait = Literal["pose", "gesture", "clothes_colour"]
-TRAITS: Final[tuple[Trait, ...]] = get_args(Trait)
+
+class Pose(StrEnum):
+    """Pose of a person."""
+
+    STANDING = "standing"
+    SITTING = "sitting"
+    LYING = "lying"
+
+
+class Gesture(StrEnum):
+    """Gesture of a person, whose own left and right are meant; none while the arms hang."""
+
+    WAVING = "waving"
+    RAISING_LEFT_ARM = "raising_left_arm"
+    RAISING_RIGHT_ARM = "raising_right_arm"
+    POINTING_LEFT = "pointing_left"
+    POINTING_RIGHT = "pointing_right"
+    NONE = "none"
+
+
+class Colour(StrEnum):
+    """Colour of the upper clothing."""
+
+    RED = "red"
+    ORANGE = "orange"
+    YELLOW = "yellow"
+    GREEN = "green"
+    BLUE = "blue"
+    WHITE = "white"
+    GREY = "grey"
+    BLACK = "black"
+
+
+class Trait(StrEnum):
+    """Part of a person's appearance."""
+
+    POSE = "pose"
+    GESTURE = "gesture"
+    CLOTHES_COLOUR = "clothes_colour"
+
+
+TRAITS: Final = tuple(Trait)
 TraitT = TypeVar("TraitT")
 KINDS_NOTE: Final = "the kind of clothing is not told apart"
 """Words for an answer about clothes."""
@@ -42,8 +79,11 @@ class Appearance:
 
     def only(self, traits: Sequence[Trait]) -> "Appearance":
         """Returns the appearance with these traits alone."""
-        pose, gesture = (self.pose if "pose" in traits else None), (self.gesture if "gesture" in traits else None)
-        return Appearance(pose, gesture, self.clothes_colour if "clothes_colour" in traits else None)
+        pose, gesture = (
+            (self.pose if Trait.POSE in traits else None),
+            (self.gesture if Trait.GESTURE in traits else None),
+        )
+        return Appearance(pose, gesture, self.clothes_colour if Trait.CLOTHES_COLOUR in traits else None)
 
     def unsure_of(self, wanted: "Appearance") -> tuple[Trait, ...]:
         """Traits that another appearance gives and this one does not."""
@@ -56,17 +96,16 @@ class Appearance:
 
     def text(self) -> str:
         """Text of the traits: "sitting, waving, dressed in red"; "a person" without any."""
-        own = self.traits()
-        if (colour := own.pop("clothes_colour", None)) is not None:
-            own["clothes_colour"] = f"dressed in {colour}"
-        return ", ".join(gesture_text(value) for value in own.values()) or "a person"
+        gesture = None if self.gesture is None else gesture_text(self.gesture)
+        colour = None if self.clothes_colour is None else f"dressed in {self.clothes_colour}"
+        return ", ".join(filter(None, (self.pose, gesture, colour))) or "a person"
 
 
-def gesture_text(value: str) -> str:
-    """Trait in a sentence: "raising the left arm", "pointing to the left", "making no gesture"."""
-    words = {"none": "making no gesture", "raising_left_arm": "raising the left arm"}
-    words |= {"raising_right_arm": "raising the right arm"}
-    return words.get(value, value.replace("pointing_", "pointing to the "))
+def gesture_text(gesture: Gesture) -> str:
+    """Gesture in a sentence: "raising the left arm", "pointing to the left", "making no gesture"."""
+    if gesture is Gesture.NONE:
+        return "making no gesture"
+    return gesture.replace("raising_", "raising the ").replace("pointing_", "pointing to the ").replace("_arm", " arm")
 
 
 @dataclass(frozen=True)

@@ -24,11 +24,8 @@ from plant.models.catalogue import load_catalogue
 from plant.models.person_figure import CLOTHES, Figure, shade
 from plant.people.ground import Ground
 from plant.rendering import render_parameters
-from plant.robots.sensor_suite import Camera
-from plant.robots.spot.kind import CAMERAS
-from plant.sensors.camera_spec import load_cameras
-from skills.robot import FrameTree
 from tests.benchmarks.harness import benchmark
+from tests.benchmarks.person_pictures import camera_pose, pictures
 
 WORLD, DISTANCES_M, CAMERA_M, BEHIND_M, TRIES = "home", (1.75, 2.55), 1.0, 0.55, 2000
 SIDES_RAD = ((-1.25, -0.6), (-0.35, 0.35), (0.6, 1.25))
@@ -100,24 +97,6 @@ def scene_of(seed):
     return built, truth, at, cameras, rng
 
 
-def camera_pose(p_W, target_W):
-    """Pose of a camera at a point that looks at another."""
-    z = (target_W - p_W) / np.linalg.norm(target_W - p_W)
-    x = np.cross(z, [0.0, 0.0, 1.0]) / np.linalg.norm(np.cross(z, [0.0, 0.0, 1.0]))
-    return RigidTransform(RotationMatrix(np.column_stack([x, np.cross(z, x), z])), p_W)
-
-
-def pictures(built, X_WC, times_s, rng):
-    """Images of the hand camera at a pose."""
-    spec = load_cameras(CAMERAS)["hand"]
-    rpy, p = X_WC.rotation().ToRollPitchYaw().vector(), X_WC.translation()
-    spec = spec.model_copy(update={"rpy_deg": tuple(np.degrees(rpy)), "xyz_m": tuple(p)})
-    camera = Camera(spec, built.scene_graph.world_frame_id(), rng, scene=built.scene)
-    frames = FrameTree({spec.frame: ("odom", X_WC)})
-    positions = built.plant.GetPositions(built.plant.CreateDefaultContext())
-    return [camera.take(positions, time_s, frames, visual=k == 0) for k, time_s in enumerate(times_s)]
-
-
 def cases(seed: int = 1, people: int = 20):
     """Seeds of the people."""
     return ((number,) for number in range(seed, seed + people))
@@ -154,7 +133,7 @@ def summary(results):
     """Shares of right, wrong and unsure views by trait, and who was taken for what."""
     figures = {}
     for trait in TRAITS:
-        pairs = [(each.truth[trait], view[trait]) for each in results for view in each.views]
+        pairs = [(getattr(each.truth, trait), getattr(view, trait)) for each in results for view in each.views]
         wrong = [pair for pair in pairs if pair[1] not in (None, pair[0])]
         figures[trait] = {
             "views": len(pairs),

@@ -292,8 +292,8 @@ def _lying(cloud: PointCloud, place_W: FloatArray) -> tuple[PointCloud, PointClo
     """Points of a long, low body near a place, and those of its upper clothing; None when there is none."""
     p_W = cloud.p_W
     counts, edges = np.histogram(p_W[:, 2], bins=np.arange(0.0, 0.8, 0.02))
-    for k in np.argsort(-counts)[:6]:
-        above = p_W[:, 2] - edges[k]
+    for base_m in (*edges[np.argsort(-counts)[:6]], 0.0):
+        above = p_W[:, 2] - base_m
         rows = np.flatnonzero((above > _THICK_M[0]) & (above < _THICK_M[1]))
         if len(rows) < 8 * _FEWEST:
             continue

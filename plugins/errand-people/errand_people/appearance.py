@@ -46,8 +46,9 @@ _ARM_M, _ARM_MOVES_M, _UP_M, _THIN_M = 0.95, 0.45, -0.18, 0.25
 the largest thickness of an arm that is held out."""
 _ALIKE: Final = 22.0
 """Largest difference of colours (CIE Lab, lightness less) of the same clothes."""
-_DARK, _LIGHT, _PALE, _VIVID, _PREVAILS = 58, 170, 55, 85, 0.6
-"""Limits of black, white, grey and vivid colours (0 to 255), and the least share of the colour that prevails."""
+_DARK, _LIGHT, _UNCLEAR, _PALE, _VIVID, _PREVAILS = 58, 172, 8, 55, 85, 0.6
+"""Limits (0 to 255) of black, of white and grey, which are unclear in between, and of vivid colours; the least share of
+a colour that prevails."""
 _HUES: Final[dict[Colour, tuple[int, int]]] = {
     Colour.RED: (172, 5),
     Colour.ORANGE: (7, 18),
@@ -336,10 +337,11 @@ def _colour(cloud: PointCloud) -> Colour | None:
         return None
     h, s, v = (each.astype(int) for each in _hsv(cloud.colours).T)
     dark, pale = v < _DARK, s < _PALE
+    bright = float(np.median(v)) - _LIGHT
     votes: dict[Colour, float] = {
         Colour.BLACK: float(np.mean(dark)),
-        Colour.WHITE: float(np.mean(~dark & pale & (v > _LIGHT))),
-        Colour.GREY: float(np.mean(~dark & pale & (v < _LIGHT - 12))),
+        Colour.WHITE: float(np.mean(~dark & pale)) if bright > _UNCLEAR else 0.0,
+        Colour.GREY: float(np.mean(~dark & pale)) if bright < -_UNCLEAR else 0.0,
     }
     for colour, (low, high) in _HUES.items():
         hue = (h >= low) & (h <= high) if low < high else (h >= low) | (h <= high)

@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
+from pydantic import Field
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from skills.robot import FloatArray
+from executive.words.knowledge import Pose
+from skills.robot import FloatArray, quantities
 
 Posture = Literal["standing", "sitting", "lying"]
 Gesture = Literal["none", "waving", "raising_left_arm", "raising_right_arm", "pointing_left", "pointing_right"]
@@ -35,6 +37,22 @@ SITS_ABOVE_M, LIES_ABOVE_M = 0.09, 0.115
 _FOLDER: Final = Path(__file__).with_name("person")
 _UNDYED: Final = "0.58 0.48 0.6 1"
 _WAVES_HZ, _WAVE_M = 0.8, 0.20
+
+
+class Spot(Pose):
+    """A pose of a person on the floor, on a seat or on a bed; a person with a route stands.
+
+    Who lies has the feet ahead, and makes no gesture.
+    """
+
+    posture: Posture = Field(default="standing", description="standing, sitting or lying")
+    top: quantities.Margin | None = Field(default=None, description="height of the seat or bed, m")
+
+    @property
+    def z_m(self) -> float:
+        """Height of the person's origin: that of a bed, or what a seat is higher than the usual one."""
+        usual_m = SEAT_M if self.posture == "sitting" else 0.0
+        return 0.0 if self.top is None else self.top - usual_m
 
 
 @dataclass(frozen=True)

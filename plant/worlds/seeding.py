@@ -15,8 +15,8 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from executive.words.mission import Route, Stop
 from plant.models.catalogue import ModelClass, ModelForm, load_catalogue
-from plant.models.person_figure import Figure, shade
-from plant.worlds.world import Lengths, ObjectRule, PersonRule, Point, Spot, SurfaceTop, World, WorldError
+from plant.models.person_figure import Figure, Spot, shade
+from plant.worlds.world import Lengths, ObjectRule, PersonRule, Point, SurfaceTop, World, WorldError
 from skills.robot import FloatArray
 
 
@@ -245,7 +245,7 @@ def _place_person(world: World, rule: PersonRule, form: ModelForm, seed: int, in
         assert route is not None
         (x, y), yaw = route.stops[0].at_W, route.first_yaw_rad
     if route is not None and (rule.stands or rule.ranges):
-        route = route.from_pose((x, y), yaw)
+        route, spot = route.from_pose((x, y), yaw), Spot(x=x, y=y)
     X_WO = RigidTransform(
         RollPitchYaw(0.0, 0.0, yaw), np.array([x, y, form.rest_height_m + spot.z_m], dtype=np.float64)
     )

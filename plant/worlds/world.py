@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from executive.words.knowledge import Knowledge, Pose
+from executive.words.knowledge import Knowledge
 from executive.words.mission import Route, Stop
 from plant.models.catalogue import ImportedObject, load_catalogue, read_imported
-from plant.models.person_figure import SEAT_M, Clothes, Gesture, Posture
+from plant.models.person_figure import Clothes, Gesture, Spot
 from plant.worlds.geometry_files import check_directives, check_model
 from skills.inputs.errors import InputError, nearest_name, suggestion
 from skills.inputs.outside import is_file
@@ -74,19 +74,6 @@ class ObjectRule(_Strict):
     surfaces: tuple[str, ...] = Field(min_length=1, description="surfaces of knowledge.yaml; the seed chooses one")
 
 
-class Spot(Pose):
-    """A pose of a person on the floor, on a seat or on a bed. Who lies has the feet ahead, and makes no gesture."""
-
-    posture: Posture = Field(default="standing", description="standing, sitting or lying")
-    top: quantities.Margin | None = Field(default=None, description="height of the seat or bed, m")
-
-    @property
-    def z_m(self) -> float:
-        """Height of the person's origin: that of a bed, or what a seat is higher than the usual one."""
-        usual_m = SEAT_M if self.posture == "sitting" else 0.0
-        return 0.0 if self.top is None else self.top - usual_m
-
-
 class PersonRule(_Strict):
     """A person who walks on a route, or stands at a pose or within three ranges in front of the robot's start pose.
 
@@ -101,8 +88,8 @@ class PersonRule(_Strict):
     bearing_rad: Angles | None = Field(default=None, description="least and greatest bearing, seen from the start pose")
     turned_rad: Angles | None = Field(default=None, description="least and greatest turn away from facing the robot")
     route: Route | None = Field(default=None, description="where the person walks")
-    gestures: tuple[Gesture, ...] = Field(default=(), description="gestures, of which the seed chooses one")
-    clothes: tuple[Clothes, ...] = Field(default=(), description="colours of clothes, of which the seed chooses one")
+    gestures: tuple[Gesture, ...] = Field(default=(), description="the seed chooses one; none while lying")
+    clothes: tuple[Clothes, ...] = Field(default=(), description="colours, of which the seed chooses one")
     receives: bool = Field(default=True, description="whether the person takes offered objects, while standing")
     answers: dict[str, str] = Field(default={}, description="answers to the robot's questions by a part of their text")
     pull_n: Pull = Field(default=15.0, description="the person's pull at an offered object, N")
@@ -115,8 +102,6 @@ class PersonRule(_Strict):
             raise ValueError("'pose' says where the person stands; leave out 'distance_m', 'bearing_rad', 'turned_rad'")
         if self.route is None and not self.stands and self.ranges is None:
             raise ValueError("give 'pose', or 'route', or 'distance_m', 'bearing_rad' and 'turned_rad'")
-        if self.route is not None and any(spot.posture != "standing" for spot in self.stands):
-            raise ValueError("a person with a 'route' stands at first; leave out 'posture'")
         return self
 
     @property

@@ -17,10 +17,10 @@ from skills.geometry import grid_inside
 from skills.manipulation.approach.base_placement import go_to_one
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.surroundings import NavigateInputs
-from skills.perception.people import people_in_scan
+from skills.perception.people_tracking import PeopleWatch
 from skills.quantities import Coordinate, Length, Tries, Turn
 from skills.robot import Pose2D
-from skills.routine import PlanningAttempt, Routine, SkillFailure
+from skills.routine import Routine, SkillFailure
 from skills.world_model import PERSON
 
 _LATENCY_S = 0.2
@@ -95,11 +95,14 @@ class FindPerson(PeopleLookingSkill[FindPersonInputs]):
                 if any(math.dist(place_W, each) < _SAME_M for each in known):
                     continue
                 known.append(place_W)
-                with PlanningAttempt() as attempt:
+                try:
                     seen = yield from self.looked_at(place_W, "somebody", asked, wanted)
-                if attempt.failure is not None:
-                    unsure.append(attempt.failure.message)
-                elif seen is not None and not _is_inside(inputs.area_W, seen.place_W):
+                except SkillFailure as failure:
+                    if failure.cause is not Cause.PLANNING:
+                        raise
+                    unsure.append(failure.message)
+                    continue
+                if seen is not None and not _is_inside(inputs.area_W, seen.place_W):
                     known.append(seen.place_W)
                 elif seen is not None:
                     known.append(seen.place_W)
@@ -140,26 +143,26 @@ class FindPerson(PeopleLookingSkill[FindPersonInputs]):
         """Points the camera to all sides; returns where somebody may be in the area, nearest first."""
         here, message = self.context.pose(), f"looking for people in the {inputs.place}"
         found = list[tuple[float, float]]()
-        scan, robot = self.context.robot.scan(), self.context.robot
-        if scan is not None:
-            X_WB = self.context.localiser.estimate().X_WO @ scan.X_OB
-            seen = people_in_scan(scan, X_WB, robot.capabilities().footprint_m, costmap=self.context.costmap)
-            found += [one.place_W for one in seen]
+        found += [one.place_W for one in PeopleWatch(self.context).scanned()]
         for turn_rad in self.options.turns_rad:
             yaw_rad = here.yaw_rad + turn_rad
             x, y = here.x_m + _LOOKS_AT_M * math.cos(yaw_rad), here.y_m + _LOOKS_AT_M * math.sin(yaw_rad)
-            with PlanningAttempt() as attempt:
-                images = yield from self.series((x, y, _LOOKS_UP_M), message, (0.0,))
-            if attempt.failure is None:
-                work = partial(candidates, images[0], self.context.localiser.estimate().X_WO)
-                found += yield from self.compute(work, latency_s=_LATENCY_S, name="people", message=message)
+            yield from self.planned(self._add_candidates((x, y, _LOOKS_UP_M), found, message))
         inside = [one for one in found if _is_inside(inputs.area_W, one)]
         return sorted(inside, key=lambda one: math.dist(one, (here.x_m, here.y_m)))
+
+    def _add_candidates(
+        self, point_W: tuple[float, float, float], found: list[tuple[float, float]], message: str
+    ) -> Routine[None]:
+        """Takes a picture towards a point, and adds where it shows skin."""
+        images = yield from self.series(point_W, message, (0.0,))
+        work = partial(candidates, images[0], self.context.localiser.estimate().X_WO)
+        found += yield from self.compute(work, latency_s=_LATENCY_S, name="people", message=message)
 
     def _go_on(self, inputs: FindPersonInputs, stood: Sequence[Pose2D]) -> Routine[bool]:
         """Drives to the free position of the area that is farthest from all earlier ones; False without any."""
         yield from self.stow()
-        footprint, costmap, here = ArmFootprint(self.context).now(), self.context.free_space(), self.context.pose()
+        footprint, costmap = ArmFootprint(self.context).now(), self.context.free_space()
         points = grid_inside(inputs.area_W, _GRID_M, first_m=_GRID_M / 2)
         away_m = np.min([np.hypot(*(points - (each.x_m, each.y_m)).T) for each in stood], axis=0)
         middle = points.mean(axis=0)
@@ -168,11 +171,10 @@ class FindPerson(PeopleLookingSkill[FindPersonInputs]):
             pose = Pose2D(x, y, math.atan2(middle[1] - y, middle[0] - x))
             if away_m[row] < self.options.apart_m:
                 return False
-            if footprint_clear(costmap, footprint, pose):
-                with PlanningAttempt() as attempt:
-                    yield from go_to_one(self, [NavigateInputs(pose, 0.3, 0.5)])
-                if attempt.failure is None:
-                    return self.context.pose() != here
+            if not footprint_clear(costmap, footprint, pose):
+                continue
+            if (yield from self.planned(go_to_one(self, [NavigateInputs(pose, 0.3, 0.5)]))) is None:
+                return True
         return False
 
 

@@ -21,7 +21,7 @@ from skills.navigate.surroundings import NavigateInputs
 from skills.perception.detector.camera_images import is_dark
 from skills.quantities import Count, Length, Turn
 from skills.robot import Image, Pose2D
-from skills.routine import PlanningAttempt, Routine, SkillFailure
+from skills.routine import Routine, SkillFailure
 
 _LATENCY_S = 0.1
 _SIZE_M = (0.5, 0.5, 1.7)
@@ -61,12 +61,11 @@ class PeopleLookingSkill(LookingSkill[InputsT]):
         found: LookedAt | None = None
         sides_rad = list[float]()
         for view in range(self.look_options.views):
-            with PlanningAttempt() as attempt:
-                yield from self._go_to_view(place_W, who, sides_rad)
-            if attempt.failure is not None:
-                if view:
-                    break
-                raise attempt.failure
+            failure = yield from self.planned(self._go_to_view(place_W, who, sides_rad))
+            if failure is not None and view:
+                break
+            if failure is not None:
+                raise failure
             here = self.context.pose()
             sides_rad.append(math.atan2(here.y_m - place_W[1], here.x_m - place_W[0]))
             seen = yield from self._look_from_here(place_W, who)
@@ -77,6 +76,16 @@ class PeopleLookingSkill(LookingSkill[InputsT]):
                 if is_other or all(getattr(found.appearance, trait) is not None for trait in asked):
                     break
         return found
+
+    def planned(self, attempt: Routine[object]) -> Routine[SkillFailure | None]:
+        """Makes an attempt; returns its failure when no way to do it was found."""
+        try:
+            yield from attempt
+        except SkillFailure as failure:
+            if failure.cause is not Cause.PLANNING:
+                raise
+            return failure
+        return None
 
     def observation(self, seen: LookedAt, name: str, place: str) -> ObjectObservation:
         """Observation of a person under a name."""

@@ -4,26 +4,18 @@ import math
 
 import numpy as np
 import pytest
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 
 from errand_people.appearance import PICTURES_S, Look, appearance_of, candidates
 from errand_people.looks import Appearance, Colour, Gesture, Pose
-from executive.words.variation import DAY_LIGHT
-from plant.diagram import DiagramConfig, LooseModel, build_diagram
-from plant.models.catalogue import load_catalogue
-from plant.models.person_figure import CLOTHES, Figure
-from plant.rendering import render_parameters
-from tests.benchmarks.person_pictures import camera_pose, pictures
+from tests.benchmarks.person_pictures import built_with, camera_pose, figure_of, person_model, pictures
 
-PERSON = load_catalogue()["person"].forms["standing"].path()
 AT, AWAY_M, CAMERA_M = np.array([1.0, 2.0]), 2.2, 1.0
 
 
-def look_of(figure, side_rad=0.3, at=AT, looks_at=AT, floor=None):
+def look_of(figure, side_rad=0.3, at=AT, looks_at=AT, directives=None):
     """What a look shows of a person who faces x, from a side."""
-    models = [] if figure is None else [LooseModel("Kim", PERSON, RigidTransform([*at, 0.0]), True, None, None, figure)]
-    models += [] if floor is None else [floor]
-    built = build_diagram(DiagramConfig(models=models, renderer_parameters=render_parameters(DAY_LIGHT)))
+    built = built_with([person_model(each, at) for each in (figure,) if each is not None], directives)
     p_W = np.array([*(looks_at + AWAY_M * np.array([math.cos(side_rad), math.sin(side_rad)])), CAMERA_M])
     look, rng = Look(looks_at), np.random.default_rng(3)
     while (height_m := look.next_height_m) is not None:
@@ -47,23 +39,23 @@ def look_of(figure, side_rad=0.3, at=AT, looks_at=AT, floor=None):
     ],
 )
 def test_a_look_tells_pose_gesture_and_colour(posture, gesture, colour, side_rad):
-    look = look_of(Figure(posture, gesture, CLOTHES[colour]), side_rad)
+    look = look_of(figure_of(posture, gesture, colour), side_rad)
     assert look.result == Appearance(Pose(posture), Gesture(gesture), Colour(colour))
     assert np.linalg.norm(look.place_W - AT) < 0.2
 
 
 def test_a_look_lowers_the_camera_to_see_who_lies(tmp_path):
-    shape = "<geometry><box><size>6 6 0.02</size></box></geometry>"
-    floor = tmp_path / "floor.sdf"
-    floor.write_text(
-        f'<sdf version="1.9"><model name="f"><link name="f"><visual name="f">{shape}</visual></link></model></sdf>'
-    )
-    look = look_of(Figure("lying", "none", CLOTHES["red"]), 1.3, floor=LooseModel("f", floor, RigidTransform(), True))
+    shape = '<visual name="f"><geometry><box><size>6 6 0.02</size></box></geometry></visual>'
+    (tmp_path / "f.sdf").write_text(f'<sdf version="1.9"><model name="f"><link name="f">{shape}</link></model></sdf>')
+    floor = tmp_path / "world.dmd.yaml"
+    add, weld = f'{{name: f, file: "{(tmp_path / "f.sdf").as_uri()}"}}', "{parent: world, child: 'f::f'}"
+    floor.write_text(f"directives:\n- add_model: {add}\n- add_weld: {weld}\n")
+    look = look_of(figure_of("lying", "none", "red"), 1.3, directives=floor)
     assert look.result == Appearance(Pose.LYING, Gesture.NONE, Colour.RED)
 
 
 def test_the_hair_of_a_person_seen_from_behind_tells_which_arm_is_raised():
-    look = look_of(Figure("standing", "raising_left_arm", CLOTHES["red"]), math.pi)
+    look = look_of(figure_of("standing", "raising_left_arm", "red"), math.pi)
     assert look.result.gesture is Gesture.RAISING_LEFT_ARM
 
 
@@ -72,14 +64,13 @@ def test_nobody_has_no_appearance():
 
 
 def test_two_people_side_by_side_are_told_apart_by_their_places():
-    look = look_of(Figure("standing", "none", CLOTHES["red"]), at=AT + [0.0, 1.0])
+    look = look_of(figure_of("standing", "none", "red"), at=AT + [0.0, 1.0])
     assert look.result.pose is None
 
 
 def test_skin_shows_where_people_may_be():
-    figure = Figure("sitting", "none", CLOTHES["green"])
-    X_WP = RigidTransform(RotationMatrix.MakeZRotation(0.0), [*AT, 0.0])
-    built = build_diagram(DiagramConfig(models=[LooseModel("Kim", PERSON, X_WP, True, None, None, figure)]))
+    figure = figure_of("sitting", "none", "green")
+    built = built_with([person_model(figure, AT)])
     pose = camera_pose(np.array([3.8, 2.0, CAMERA_M]), np.array([1.0, 2.0, 0.9]))
     (image,) = pictures(built, pose, (0.0,), np.random.default_rng(3))
     found = candidates(image, RigidTransform())

@@ -10,8 +10,9 @@ from pydrake.math import RollPitchYaw
 
 from executive.words.mission import Route
 from plant.models.catalogue import load_catalogue
+from plant.models.person_figure import Spot
 from plant.worlds.seeding import outline_W, place_objects, place_people, polygon_distance, standing_W
-from plant.worlds.world import PersonRule, Spot, WorldError, load_world
+from plant.worlds.world import PersonRule, WorldError, load_world
 from skills.robot import Pose2D
 
 SEEDS = range(51)

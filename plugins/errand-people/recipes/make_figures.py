@@ -1,6 +1,7 @@
 """SDF files of figures of people: standing, sitting and lying, of ellipsoids and capsules.
 
-`python -m errand_train.models.person_figure` writes them. The arms lie in their own frames, which the renderer poses.
+`python plugins/errand-people/recipes/make_figures.py` writes them into `plant/models/person`. The
+arms lie in their own frames, which the renderer poses.
 """
 
 from typing import Final, get_args
@@ -80,9 +81,7 @@ def figure_sdf(posture: Posture) -> str:
     box((0.22, 0.50, 0.60), (0.0, 0.0, 1.14))
     box((0.20, 0.18, 0.31), (0.01, 0.0, 1.595))
     parts = "\n".join(visuals + solids)
-    head = (
-        '<?xml version="1.0"?>\n<!-- a figure of a person; made by errand_train.models.person_figure, don\'t edit. -->'
-    )
+    head = '<?xml version="1.0"?>\n<!-- a figure of a person; made by make_figures.py -->'
     return f'{head}\n<sdf version="1.9"><model name="person"><link name="person">\n{parts}\n</link></model></sdf>\n'
 
 

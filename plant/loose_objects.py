@@ -109,7 +109,7 @@ class _Hand:
         self.asleep = False
         self._spheres, self._others = _Spheres(plant, inspector, links), _Spheres(plant, inspector, others)
         self._fixed = fixed
-        self._measured = np.full((len(links), 3), np.inf), np.zeros(len(links))
+        self._measured = np.full((len(self._spheres.radii_m), 3), np.inf), np.zeros(len(self._spheres.radii_m))
 
     def is_near(self, context: Context, margin_m: float, objects_W: FloatArray, radii_m: FloatArray) -> bool:
         """Returns whether anything except the robot itself is within a margin of the hand.

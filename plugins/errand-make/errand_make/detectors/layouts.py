@@ -106,6 +106,8 @@ def recognise(outputs: Outputs, facts: Facts) -> tuple[str, ...]:
     first, *others = outputs.values()
     dense = {count * boxes for count in facts.cells for boxes in (1, 3)}
     (rows, columns), more = first.shape[-2:] if first.ndim > 1 else (0, 0), facts.task in WITH_MORE_COLUMNS
+    if first.shape[:2] == (1, 1) and columns == 7:
+        return ("detection_output",) if _is_list(first[0, 0], "detection_output", facts) else ()
     if first.ndim == 2 or (columns == 7 and rows not in dense):
         lists = tuple(name for name in LAYOUTS if _is_list(first.reshape(-1, columns), name, facts))
         if lists or first.ndim == 2:
@@ -131,6 +133,8 @@ def _named_arrays(outputs: Outputs, boxes: NDArray[Any], facts: Facts) -> str:
         return "mmdeploy"
     if facts.sized:
         return "dfine"
+    if any(each.shape == (2,) and each.dtype.kind != "f" for each in outputs.values()):  # the picture's sides
+        return "detectron2"
     return "ssd" if _are_shares(boxes) else "torchvision" if boxes.ndim == 2 else "nms"
 
 
@@ -177,8 +181,8 @@ def _arrays(outputs: Outputs) -> tuple[NDArray[Any], ...] | None:
         return None
     rows = {name: each for name, each in outputs.items() if each.shape == boxes.shape[:-1] and "num" not in name}
     whole = [name for name in rows if rows[name].dtype.kind != "f" or re.search("class|label", name)]
-    real = [each for name, each in rows.items() if name not in whole]
-    scores = boxes[..., 4] if boxes.shape[-1] == 5 else next(iter(real), None)
+    real = sorted(rows.keys() - set(whole), key=lambda name: (not re.search("score|conf", name), [*rows].index(name)))
+    scores = boxes[..., 4] if boxes.shape[-1] == 5 else rows[real[0]] if real else None
     return None if scores is None or not whole else (boxes[..., :4], scores, rows[whole[0]])
 
 
@@ -186,6 +190,8 @@ def _pair(outputs: Outputs) -> tuple[NDArray[Any], NDArray[Any]] | None:
     """Boxes (1, A, 4) or (1, A, 1, 4), and values (1, A, K), among outputs with one row for each box."""
     found = [name for name, each in outputs.items() if each.ndim in (3, 4) and each.shape[-1] == 4]
     boxes = min(found, key=lambda name: not re.search("box|dets", name), default=None)
+    if len({outputs[name].shape[1] for name in found if re.search("box", name)}) > 1:  # heads of several strides
+        return None
     others = [name for name, each in outputs.items() if name != boxes and each.ndim == 3]
     values = min(others, key=lambda name: not re.search("logit|score|conf|class|label", name), default=None)
     if boxes is None or values is None or outputs[values].shape[1] != outputs[boxes].shape[1]:
@@ -236,7 +242,7 @@ def _boxes_and_values(outputs: Outputs, layout: Layout, facts: Facts) -> tuple[F
         boxes, *more = (each[0] if found[0].ndim > 2 else each for each in found)
         return boxes.reshape(-1, 4), more[0] if layout.form == "pair" else np.stack(more, axis=1)
     first = next(iter(outputs.values()))
-    table = first[0] if first.ndim == 3 else first
+    table = first[(0,) * (first.ndim - 2)]
     if layout.form == "list":
         table = table if 0 in layout.order else table[table[:, 0] == table[:1, 0]]
         return table[:, layout.order[:4]], table[:, layout.order[4:]]

@@ -26,6 +26,8 @@ _TRAIL: Final = 0.1
 _LEGS: Final = 4
 _ANGLES_RAD: Final = (0.0, math.pi / 2.0, -math.pi / 2.0, math.pi)
 _ROLLERS: Final = re.compile(r"mecanum|omni_?(wheel|base|drive)|swedish|planar_move", re.IGNORECASE)
+_DRIVEN: Final = re.compile(r"planar_?move|(diff(erential)?|skid|omni)_?(drive|steer)", re.IGNORECASE)
+"""Plugins by which a simulator drives a base over the floor."""
 _MOST_LEG: Final = 3
 """Most joints of a leg that lies at zero."""
 _PROPELLER: Final = re.compile(r"(^|_)(prop|propeller|thruster)s?(_|\d|$)", re.IGNORECASE)
@@ -217,4 +219,6 @@ def find_drive(tree: KinematicTree, wheels: Sequence[Wheel], legs: Sequence[Urdf
 
 def _stands(tree: KinematicTree) -> bool:
     """True for a base that a file names, moves over the floor or puts on wheels that do not turn."""
-    return tree.drives_by_joints or has_fixed_wheels(tree) or "base_footprint" in tree.links_of[tree.root]
+    plugins = {each.get("filename", "") for each in tree.urdf.robot.iter("plugin")}
+    named = "base_footprint" in tree.links_of[tree.root] or any(map(_DRIVEN.search, plugins))
+    return named or tree.drives_by_joints or has_fixed_wheels(tree)

@@ -198,7 +198,9 @@ class Inference:
         data |= {"max_speed": 0.6, "max_turn_rate": 1.0, "runtime": 7200.0}
         self.notes.append(("base", f"{note}; speeds (m/s, rad/s) and the battery's time (s) are a guess"))
         if parts.casters:
-            self.notes.append(("base", f"{len(parts.casters)} casters belong to the base and do not turn"))
+            many = len(parts.casters)
+            what = f"{many} casters belong to the base and do" if many > 1 else "1 caster belongs to the base and does"
+            self.notes.append(("base", f"{what} not turn"))
         return data
 
     def arm_points(self, angles: FloatArray) -> FloatArray:
@@ -277,8 +279,10 @@ class Inference:
             places.append(p)
             file = CameraFile(link=link, axes="optical" if "optical" in link else "link")
             cameras[f"camera_{len(cameras)}"] = file.model_dump(mode="json")
-        if cameras:
-            note = "pixels, field of view (rad) and depth (m) are not in a URDF, and are a guess"
+        note = "pixels, field of view (rad) and depth (m) are not in a URDF, and are a guess"
+        if not cameras and not lost:
+            note = "no link looks like a camera, so the robot finds no objects; to give it one, name its link here"
+        if cameras or not lost:
             self.notes.append(("cameras", note))
         if lost:
             self.notes.append(("cameras", f"left out, since no part points them: {listing(lost)}"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Final, Literal
 from xml.etree.ElementTree import Element
@@ -84,7 +85,8 @@ class MeshCopies:
                 hint = f"give its folder: --package {package}=DIR"
                 raise urdf.error(mesh, f"there is no folder of package '{package}' with {rest}", hint)
         if not path.is_file():
-            other = next((each.name for each in sorted(path.parent.glob(f"{path.stem}.*"))), "")
+            beside = [each.name for each in sorted(path.parent.glob(f"{path.stem}.*"))]
+            other = next(iter(get_close_matches(path.name, beside, n=1, cutoff=0.0)), "")
             other = f"write the name of {other}, which is there" if other else "correct the name"
             hint = f"{other}, or give the folder by --package NAME=DIR"
             raise urdf.error(mesh, f"there is no mesh {path}", hint)

@@ -50,7 +50,7 @@ def render_robot(name: str, urdf: Path, folder: Path, *, packages: Mapping[str, 
     home.mkdir(parents=True)
     source = read_source(urdf, packages)
     still = fix_still_joints(source)
-    check_extent(source)
+    empty = check_extent(source)
     copies = MeshCopies(source, packages, home)
     (home / MESHES).mkdir()
     meshes = copies.meshes()
@@ -80,7 +80,7 @@ def render_robot(name: str, urdf: Path, folder: Path, *, packages: Mapping[str, 
     if still:
         what = f"joint{'s' * (len(still) > 1)} {listing(still)}: lower and upper are both 0, so taken as fixed"
         notes.append(f"urdf: {what}; write the range of one that moves")
-    return [*notes, *(f"meshes: {note}" for note in copies.all_notes())]
+    return [*notes, *(f"urdf: {note}" for note in empty), *(f"meshes: {note}" for note in copies.all_notes())]
 
 
 def _sees_table(can: Capabilities) -> bool:

@@ -125,6 +125,9 @@ def _arm(tree: KinematicTree, run: Sequence[UrdfJoint]) -> Arm | str:
     fingers = list(tree.after(run[-1].child)) if turning else []
     if slides and not turning and len(run) > LEAST_ARM:
         turning, fingers = list(run[slides[-2] + 1 : -1] if len(slides) > 1 else run[:-1]), [run[-1]]
+    spindles = [each for each in fingers if each.kind == "continuous" and not tree.after(each.child)]
+    if any(each.kind == "prismatic" for each in fingers):
+        fingers = [each for each in fingers if each not in spindles]  # they show the motor of fingers that slide
     if len(turning) > LEAST_ARM and not fingers and is_jaw(tree, turning[-1]):
         fingers = [turning.pop()]
     places = [tree.place(each) for each in turning]

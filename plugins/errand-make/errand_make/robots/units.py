@@ -15,6 +15,8 @@ from plant.robots.urdf_robot.urdf_file import UrdfFile, UrdfJoint
 from skills.inputs.errors import listing
 
 _LARGEST_M: Final = 10.0
+_LEAST_M: Final = 1e-3
+"""Size that a shape gets instead of 0, as placeholders have it."""
 _FURTHEST_RAD: Final = 4.0 * math.pi + 0.1
 """Largest limit of a joint that turns, two turns; larger ones are of joints without limits, or in degrees."""
 _MOST_DEGREES: Final = 720.0
@@ -26,10 +28,11 @@ _HEAVY_KG: Final = 50.0
 _HEAVIEST_KG: Final = 2000.0
 
 
-def check_extent(urdf: UrdfFile) -> None:
-    """Raises InputError for a link that stands, or a primitive shape that reaches, too far for a robot in metres.
+def check_extent(urdf: UrdfFile) -> list[str]:
+    """Gives primitive shapes of size 0 a millimetre; returns notes on their links.
 
-    The pose of the whole robot in a world, on a root without shapes, does not count.
+    Raises InputError for a link that stands, or a primitive shape that reaches, too far for a robot in metres, and for
+    a negative size. The pose of the whole robot in a world, on a root without shapes, does not count.
     """
     empty = not urdf.shapes(urdf.root, "visual") and not urdf.shapes(urdf.root, "collision")
     for joint in urdf.joints.values():
@@ -43,13 +46,23 @@ def check_extent(urdf: UrdfFile) -> None:
         ("cylinder", "radius", "0"),
         ("sphere", "radius", "0"),
     )
+    empty_links = dict[str, None]()
     for link, element in urdf.links.items():
         for tag, key, default in sizes:
             for shape in element.iter(tag):
-                largest_m = max(urdf.numbers(shape, key, default))
+                sizes_m = urdf.numbers(shape, key, default)
+                largest_m = max(sizes_m)
+                if min(sizes_m) < 0.0:
+                    raise urdf.error(shape, f"link {link} has a {tag} of {min(sizes_m):g} m", "write its size, above 0")
+                if min(sizes_m) == 0.0:
+                    shape.set(key, " ".join(f"{max(each, _LEAST_M):g}" for each in sizes_m))
+                    empty_links[link] = None
                 if largest_m > _LARGEST_M:
                     what = f"link {link} has a {tag} of {largest_m:g} m: its unit is probably the millimetre"
                     raise urdf.error(shape, what, "write metres, or remove what is no part of the robot")
+    one = len(empty_links) == 1
+    what = f"link{'s' * (not one)} {listing(list(empty_links))}: shapes of size 0 are taken as of 1 mm"
+    return [what] if empty_links else []
 
 
 def unit_notes(tree: KinematicTree, wheels: Collection[str]) -> Iterator[str]:
@@ -75,7 +88,9 @@ def unit_notes(tree: KinematicTree, wheels: Collection[str]) -> Iterator[str]:
     heavy = [link for link, mass in masses_kg.items() if mass > _HEAVIEST_KG or _is_dense(tree, link, mass)]
     if heavy:
         largest = max(heavy, key=masses_kg.__getitem__)
-        yield f"link {largest} weighs {masses_kg[largest]:g} kg, probably grams; write kilograms"
+        mass_kg = masses_kg[largest]
+        why = "probably grams; write kilograms" if mass_kg > _HEAVIEST_KG else "too much for its shapes; check both"
+        yield f"link {largest} weighs {mass_kg:g} kg, {why}"
 
 
 def _limit(joint: UrdfJoint) -> float:

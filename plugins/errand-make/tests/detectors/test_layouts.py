@@ -5,6 +5,7 @@ import pytest
 
 from errand_make.detectors.exported import ExportedNetwork, load_exported
 from errand_make.detectors.layouts import LAYOUTS
+from skills.inputs.errors import InputError
 from tests.skills.exported_networks import export
 
 NAMES = {"names": "{0: 'bottle', 1: 'coke', 2: 'hammer'}", "task": "detect"}
@@ -16,6 +17,7 @@ SCORES = [0.125, 0.75, 0.25]
 LOGITS = np.log(np.array(SCORES) / (1 - np.array(SCORES))).tolist()
 
 
+HEADS = (("cls", 3), ("bbox", 4))
 BACKGROUND = {"names": "{0: 'background', 1: 'coke', 2: 'hammer'}"}
 
 
@@ -53,6 +55,8 @@ CASES = {
     "detr_softmax": ({"logits": NO_OBJECT, "pred_boxes": rows(*CENTRE_SHARES)}, NAMES),
     "dense": ({"scores": rows(*SCORES), "boxes": rows(*CORNERS)}, NAMES),
     "torchvision": ({"a": f32(CORNERS), "b": np.array([1]), "c": f32(0.75)}, NAMES),
+    "detectron2": ({"4": f32(CORNERS), "5": np.array([1]), "6": f32(0.75), "7": np.array([64, 64])}, NAMES),
+    "detection_output": ({"out": f32([[[0, 1, 0.75, *SHARES], [-1] + [0] * 6]])}, NAMES),
     "darknet": ({"boxes": rows(*SHARES)[:, :, None], "confs": rows(*SCORES)}, NAMES),
 }
 
@@ -62,6 +66,7 @@ TENSORFLOW = {
     "efficientdet": {"detections": rows(0, *ROW_FIRST, 0.75, 1)},
     "tensorflow": {
         "num_detections": f32(1),
+        "detection_anchor_indices": rows(7)[..., 0],
         "detection_boxes": rows(*[each / 64 for each in ROW_FIRST]),
         "detection_scores": rows(0.75)[..., 0],
         "detection_classes": rows(1)[..., 0],
@@ -128,6 +133,12 @@ def test_raw_heads_beside_the_boxes_are_left_out(tmp_path):
     outputs, metadata = CASES["yolov5"]
     outputs = {**outputs, "397": np.ones((1, 3, 8, 8, 8), np.float32)}
     assert ("coke", 0.75, tuple(CORNERS)) == best(loaded(export(tmp_path / "own.onnx", outputs, metadata=metadata)))
+
+
+def test_heads_of_several_strides_are_no_boxes_with_scores(tmp_path):
+    heads = {f"{name}_{side}": np.zeros((1, side, count), np.float32) for side in (64, 16) for name, count in HEADS}
+    with pytest.raises(InputError, match="no layout that Errand reads"):
+        loaded(export(tmp_path / "own.onnx", heads, metadata=NAMES))
 
 
 def test_boxes_of_dfine_are_in_pixels_of_the_size_that_it_is_given(tmp_path):

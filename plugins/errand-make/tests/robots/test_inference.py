@@ -49,7 +49,7 @@ def width_m(made):
 def test_casters_belong_to_the_base_and_are_no_head(make):
     made = make(cart.base(), cart.wheels(), *(cart.caster(f"caster_{y}", -0.2, y) for y in (0.1, -0.1)))
     assert made.data["base"]["motion"] == "differential" and "head" not in made.data
-    assert "2 casters belong to the base" in made.notes and "2 wheels were found" in made.notes
+    assert "2 casters belong to the base and do" in made.notes and "2 wheels were found" in made.notes
 
 
 def test_a_joint_that_turns_very_far_is_a_wheel(make):
@@ -156,6 +156,12 @@ def test_a_base_without_wheels_and_its_head_are_a_guess(make):
     assert made.data["head"] == ["pan_joint", "tilt_joint"] and "omnidirectional is a guess" in made.notes
 
 
+def test_a_plugin_that_moves_the_base_makes_it_one(make):
+    plugin = '<gazebo><plugin name="move" filename="libgazebo_ros_planar_move.so"/></gazebo>'
+    made = make(cart.base(), plugin, cart.arm())
+    assert made.data["arm"]["joints"] == ARM and "omnidirectional is a guess" in made.notes
+
+
 def test_motors_of_legs_are_no_rotors(make):
     legs = [cart.leg(f"leg_{x}_{y}", x, y) for x in (0.2, -0.2) for y in (0.15, -0.15)]
     made = make(cart.base(), *legs, pivots(["hip_rotor_1", "hip_rotor_2"], CORNERS[:2], kind="fixed"))
@@ -254,6 +260,13 @@ def test_fingers_that_slide_are_measured(make):
     assert made.data["gripper"]["widest"] == pytest.approx(0.09) and made.data["gripper"]["tip_x"] == pytest.approx(0.2)
 
 
+def test_a_motor_that_spins_beside_sliding_fingers_is_no_finger(make):
+    motor = [link("crank", 0.02, box("0.03 0.01 0.01"), size=0.02)]
+    motor += [joint("crank_joint", "continuous", "palm", "crank", "0.02 0 0", axis="1 0 0")]
+    made = make(cart.base(), cart.wheels(), cart.arm(), cart.palm(), motor, cart.fingers())
+    assert made.data["gripper"]["widest"] == pytest.approx(0.09) and made.data["held"] == {"crank_joint": 0.0}
+
+
 @pytest.mark.parametrize(
     ("parts", "reason"),
     [
@@ -335,6 +348,11 @@ def test_a_marker_for_a_camera_is_no_camera(make):
     marker = ['<link name="link_aruco_d405"/>', joint("tag", "fixed", "base_link", "link_aruco_d405", "-0.2 0 0.5")]
     made = make(cart.base(), cart.wheels(), marker)
     assert [each["link"] for each in made.data["cameras"].values()] == ["camera_link"]
+
+
+def test_a_robot_without_cameras_is_said_to_find_no_objects(make):
+    made = make([part.replace("camera", "mast") for part in cart.base()], cart.wheels())
+    assert "cameras" not in made.data and "no link looks like a camera, so the robot finds no objects" in made.notes
 
 
 def test_a_lidar_is_added_where_no_link_looks_like_one(make):

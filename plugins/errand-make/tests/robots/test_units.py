@@ -49,7 +49,7 @@ def test_a_base_in_grams_is_noted(render):
 def test_a_finger_in_grams_is_noted_by_its_density(render):
     fingers = changed(cart.fingers(), 'mass value="0.05"', 'mass value="55"')
     notes = render(cart.base(), cart.wheels(), cart.arm(), cart.palm(), fingers)
-    assert "left_finger weighs 55 kg, probably grams" in notes
+    assert "left_finger weighs 55 kg, too much for its shapes; check both" in notes
 
 
 def test_a_base_of_lead_is_no_base_in_grams(render):
@@ -82,6 +82,18 @@ def test_joints_and_shapes_in_millimetres_are_refused_with_their_line(render, si
     with pytest.raises(InputError, match=what) as refused:
         render(cart.base(), cart.wheels(), mast)
     assert refused.value.line in (12, 13)
+
+
+def test_a_shape_without_size_is_taken_as_tiny(render):
+    dot = [link("dot", 0.1, box("0.0 0.0 0.0")), joint("dot_mount", "fixed", "base_link", "dot")]
+    assert "link dot: shapes of size 0 are taken as of 1 mm" in render(cart.base(), cart.wheels(), dot)
+
+
+def test_a_shape_of_negative_size_is_refused(render):
+    dot = [link("dot", 0.1, box("0.1 -0.1 0.1")), joint("dot_mount", "fixed", "base_link", "dot")]
+    with pytest.raises(InputError, match=r"link dot has a box of -0.1 m") as refused:
+        render(cart.base(), cart.wheels(), dot)
+    assert refused.value.line == 12
 
 
 def test_a_robot_may_stand_far_out_in_its_world(render):

@@ -45,7 +45,9 @@ _GOING_AWAY: Final = 1001
 _NOT_ALLOWED: Final = 4403
 
 
-_SCENE: Final = "sandbox allow-scripts; default-src 'unsafe-inline' data: blob:; frame-ancestors http://"
+_FRAMES: Final = "frame-ancestors http://127.0.0.1:* http://localhost:*"
+"""Policy that lets only pages of this machine show the page in a frame."""
+_SCENE: Final = f"sandbox allow-scripts; default-src 'unsafe-inline' data: blob:; {_FRAMES} http://"
 """Policy of the scene, without the host: it has an origin, and in Chromium a process, of its own, and no server."""
 _TUNNEL: Final = "ssh -L {port}:127.0.0.1:{port} USER@HOST"
 _OPEN: Final = f"\nThe link is all that protects the robot. The other way is --view-host {HOST} and a tunnel: {_TUNNEL}"
@@ -164,12 +166,11 @@ class PageServer(Server):
         return endpoint
 
     async def _page(self, request: Request) -> Response:
-        response = FileResponse(PAGE_FOLDER / "index.html")
-        response.headers["Content-Security-Policy"] = (
+        policy = (
             f"default-src 'self'; img-src 'self' data: blob:; connect-src 'self' ws://{request.headers['host']}; "
-            "frame-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
+            f"frame-src 'self'; {_FRAMES}; base-uri 'none'; form-action 'none'"
         )
-        return response
+        return FileResponse(PAGE_FOLDER / "index.html", headers={"Content-Security-Policy": policy})
 
     async def _scene(self, request: Request) -> Response:
         """Sends the page of the scene, which is built for the first browser that asks for it."""

@@ -91,7 +91,7 @@ class Checker:
             refuse_unusable(prepared.world, prepared.request.seed)
             stacks = [robot_stack(each.robot) for each in prepared.all if each.robot.stack_file is not None]
             detectors = tuple(filter(None, dict.fromkeys(shared_detector(stack).about for stack in stacks)))
-            checked = {each.mission.robot_name: check_prepared(each, self._planner(each)) for each in prepared.all}
+            checked = {each.mission.robot_name: check_prepared(each, self.planner(each)) for each in prepared.all}
         except InputError as error:
             return Checked(file, _placed(file, (error, *error.others)), trees)
         except Exception as defect:  # the other files must be checked as well
@@ -107,7 +107,8 @@ class Checker:
         total, limit_s = _total(prepared, estimates), prepared.time_limit_s
         return Checked(file, _placed(file, errors), trees, total, warnings, limit_s, detectors)
 
-    def _planner(self, prepared: Prepared) -> RoutePlanner:
+    def planner(self, prepared: Prepared) -> RoutePlanner:
+        """Returns the planner of routes for the robot of a mission."""
         world, robot = prepared.world, prepared.robot
         key = (world.folder, robot.kind, robot.stack_file)
         if key not in self._routes:

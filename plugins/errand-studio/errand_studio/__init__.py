@@ -1,0 +1,1 @@
+"""Browser studio: writes, checks, runs and compares missions."""

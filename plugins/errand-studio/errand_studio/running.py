@@ -1,0 +1,130 @@
+"""Runs missions in processes of their own, as `errand run` with a live page, and stops them."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import re
+import signal
+import sys
+import urllib.request
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+from urllib.error import URLError
+from urllib.parse import parse_qs, urlsplit
+
+from skills.inputs.errors import InputError
+
+_PAGE: Final = re.compile(r"The page: (http://\S+)")
+MOST_LINES: Final = 500
+_STOP_S: Final = 15.0
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """Options of a run, as the form has them; an empty text leaves the choice to the mission."""
+
+    world: str = ""
+    seed: int = 1
+    robots: str = ""
+    scenario: str = ""
+    faults: str = ""
+    people: int = 0
+
+    def arguments(self) -> list[str]:
+        """Returns the arguments for `errand run`; each line of `faults` is one fault."""
+        named = {"--world": self.world, "--robots": self.robots, "--scenario": self.scenario}
+        values = [f"{name}={value.strip()}" for name, value in named.items() if value.strip()]
+        faults = [f"--fault={line.strip()}" for line in self.faults.splitlines() if line.strip()]
+        return [*values, *faults, f"--seed={self.seed}", *([f"--people={self.people}"] if self.people else [])]
+
+
+@dataclass
+class Running:
+    """Run of a mission: its process, its last lines, and the address of its live page."""
+
+    name: str
+    process: asyncio.subprocess.Process
+    lines: deque[str] = field(default_factory=lambda: deque(maxlen=MOST_LINES))
+    page: str = ""
+    note: str = ""
+
+    @property
+    def is_over(self) -> bool:
+        """Returns whether the process has ended, and with it its live page."""
+        return self.process.returncode is not None
+
+    async def follow(self, stops: Iterable[str]) -> None:
+        """Reads the process's lines until it ends; sets breakpoints at the nodes `stops` once the page is there."""
+        stream = self.process.stdout
+        while stream is not None and (line := await stream.readline()):
+            text = line.decode("utf-8", "replace").rstrip()
+            if not self.page and (found := _PAGE.search(text)):
+                self.page = found[1]
+                self.note = await asyncio.to_thread(_set_breakpoints, self.page, tuple(stops))
+            else:
+                self.lines.append(text)
+        await self.process.wait()
+
+    async def stop(self) -> None:
+        """Ends the run in order, as Ctrl-C does, and kills it if that takes too long."""
+        for number in (signal.SIGINT, signal.SIGKILL):
+            if self.is_over:
+                return
+            os.killpg(self.process.pid, number)
+            try:
+                await asyncio.wait_for(asyncio.shield(self.process.wait()), _STOP_S)
+            except TimeoutError:
+                continue
+
+
+class MissionRuns:
+    """Runs that a studio has started: one at a time."""
+
+    def __init__(self, out: Path) -> None:
+        self.out = out
+        self.current: Running | None = None
+        self._tasks = set[asyncio.Task[None]]()
+
+    async def start(self, file: Path, options: RunOptions, stops: Sequence[str] = ()) -> Running:
+        """Starts the mission of a file. Raises InputError while another one runs."""
+        if self.current is not None and not self.current.is_over:
+            raise InputError(f"{self.current.name} runs already", hint="stop it first")
+        command = ["run", str(file), *options.arguments(), "--view", f"--out={self.out}"]
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-u", "-m", "executive.cli", *command),
+            stdout=asyncio.subprocess.PIPE,
+            stderr=asyncio.subprocess.STDOUT,
+            cwd=file.parent,
+            start_new_session=True,
+        )
+        self.current = Running(file.name, process)
+        task = asyncio.create_task(self.current.follow(stops))
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return self.current
+
+    async def stop(self) -> None:
+        """Stops the current run."""
+        if self.current is not None:
+            await self.current.stop()
+
+
+def _set_breakpoints(page: str, nodes: Sequence[str]) -> str:
+    """Sets breakpoints by the actions of a live page; returns a sentence if one cannot be set."""
+    parts = urlsplit(page)
+    token = parse_qs(parts.query).get("token", [""])[0]
+    for node in nodes:
+        body: Mapping[str, str] = {"node": node}
+        request = urllib.request.Request(
+            f"http://{parts.netloc}/action/break", json.dumps(body).encode(), {"x-errand-token": token}
+        )
+        try:
+            urllib.request.urlopen(request, timeout=5.0).close()
+        except (URLError, OSError) as error:
+            return f"no breakpoint at {node}: {error}"
+    return ""

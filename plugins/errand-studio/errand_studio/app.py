@@ -67,7 +67,7 @@ def serve(workshop: Workshop, address: tuple[str, int], tell: Callable[[str], No
     logging.getLogger("nicegui").setLevel(logging.ERROR)
     core.sio.eio.max_http_buffer_size = MOST_MESSAGE
     nicegui_app.on_startup(lambda: tell(f"The studio: {url_of(address[0], port)}?token={token}"))
-    nicegui_app.on_shutdown(workshop.runs.stop)
+    nicegui_app.on_shutdown(workshop.runs.close)
     config = uvicorn.Config(
         Guard(site, token, host),
         log_level="critical",

@@ -17,6 +17,7 @@ from skills.inputs.errors import InputError
 
 MOST_ROWS: Final = 200
 _HEADS: Final = ("", "claim", "mission", "world", "seed", "begun", "referee", "s", "contacts", "cause", "message", "")
+_NUMBERS: Final = ("seed", "begun", "s", "contacts")
 _MOST_STRIP: Final = 120
 _BESIDE: Final = 12
 """Entries of the logs that are shown before and behind the first difference."""
@@ -121,7 +122,7 @@ def rows_html(rows: list[RunRow], ticked: list[str], left: int) -> str:
             f'<td>{escape(row.cause)}</td><td class="dim">{escape(row.message[:160])}</td>'
             f'<td class="dim">{escape(row.source)}</td></tr>'
         )
-    head = "".join(f"<th>{name}</th>" for name in _HEADS)
+    head = "".join(f"<th{' class=n' * (name in _NUMBERS)}>{name}</th>" for name in _HEADS)
     more = f'<p class="nothing"><button class="fix" data-do="more rows">{left} more</button></p>' if left > 0 else ""
     return f'<table class="rows"><tr>{head}</tr>{"".join(lines)}</table>{more}'
 
@@ -206,9 +207,8 @@ def _times(left: Visit, right: Visit) -> str:
         change = "" if one is None or other is None else f"{other - one:+.1f}"
         cells = "".join(f'<td class="n">{"" if each is None else f"{each:.1f}"}</td>' for each in (one, other))
         rows.append(f'<tr><td>{escape(name)}</td>{cells}<td class="n">{change}</td></tr>')
-    return (
-        f'<table class="rows"><tr><th>step</th><th>left</th><th>right</th><th>change</th></tr>{"".join(rows)}</table>'
-    )
+    head = "".join(f'<th class="n">{name}</th>' for name in ("left", "right", "change"))
+    return f'<table class="rows"><tr><th>step</th>{head}</tr>{"".join(rows)}</table>'
 
 
 def _picture(side: Visit, name: str) -> str:

@@ -29,7 +29,7 @@ def complete(text: str, line: int, column: int, knowledge: Knowledge) -> tuple[i
     path, siblings, is_value = _context(lines, line, before)
     wanted = before[start:].strip().lower()
     found = _values(path, siblings, knowledge) if is_value else _keys(path, siblings)
-    return start, [option for option in found if wanted in option["label"].lower()]
+    return start, [option for option in found if f" {wanted}" in f" {option['label'].lower()}"]
 
 
 def _context(lines: Sequence[str], line: int, before: str) -> tuple[list[str], dict[str, str], bool]:
@@ -37,23 +37,22 @@ def _context(lines: Sequence[str], line: int, before: str) -> tuple[list[str], d
     keys, indent = _outer_keys(lines, line, before)
     siblings = _beside(lines, line, indent)
     match = _LINE.match(before)
-    key, rest = (match[3], match[4]) if match else (None, None)
-    if key is None:
-        return keys, siblings, False
-    path, is_value = [*keys, key.strip()], True
-    opened = list[str]()
+    key, rest = (match[3], match[4] if match[3] else match[5]) if match else (None, None)
+    path, is_value = (keys, False) if key is None else ([*keys, key.strip()], True)
+    opened = list[tuple[str, list[str]]]()
     for piece in _PIECE.finditer(rest or ""):
+        bracket, above = opened[-1] if opened else ("", keys)
         if piece[0] in "{[":
-            opened.append(path[-1] if piece[0] == "{" else "[")
+            opened.append((piece[0], path))
+            siblings = {"skill": siblings.get("skill", "")} if path[-1:] == ["with"] else {}
             is_value = piece[0] == "["
         elif piece[0] in "}]":
+            path, is_value = above, True
             opened = opened[:-1]
-            path = path[: max(len(keys) + 1, len(path) - 1)]
         elif piece[0] == ",":
-            inside = bool(opened) and opened[-1] != "["
-            path, is_value = (path[: len(keys) + len(opened)], False) if inside else (path, True)
+            path, is_value = above, bracket == "["
         else:
-            path, is_value = [*path[: len(keys) + max(1, len(opened))], piece[1].strip()], True
+            siblings, path, is_value = {**siblings, piece[1].strip(): ""}, [*above, piece[1].strip()], True
     return path, siblings, is_value
 
 
@@ -170,7 +169,6 @@ _KINDS: Final[Mapping[str, Sequence[str]]] = {
     "do": ("task",),
     "skill": ("skill",),
     "world": ("world",),
-    "camera": (),
 }
 """Kinds of names that stand behind a key."""
 

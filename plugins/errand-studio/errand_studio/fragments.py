@@ -10,6 +10,7 @@ from typing import Any, Final
 from errand_studio.checking import Insight, Judged, Message, PlanMap
 from errand_studio.outline import Row
 from errand_studio.palette import Example
+from executive.app.report.run_report import VERDICTS
 from executive.tree.node_view import NodeView
 from executive.view.text import note_of, style_of
 
@@ -32,7 +33,10 @@ def outline_html(rows: Sequence[Row], marked: Mapping[int, bool], stops: Collect
             ["step" if not row.is_list else "list", *(["bad"] if any(found) else ["warned"] if found else [])]
         )
         place = _attributes(
-            data_path=json.dumps(row.path), data_line=row.line, data_end=row.end, data_list=int(row.is_list)
+            data_path=json.dumps(row.path, separators=(",", ":")),
+            data_line=row.line,
+            data_end=row.end,
+            data_list=int(row.is_list),
         )
         kind = f"<b>{escape(row.kind)}</b> " if row.kind else ""
         more = f' <span class="policy">{escape(row.more)}</span>' if row.more else ""
@@ -173,3 +177,14 @@ def state_html(insight: Insight | None) -> str:
 def lines_html(lines: Sequence[str], note: str) -> str:
     """Returns the last lines of a run."""
     return f'<pre class="lines">{escape(chr(10).join([*lines, *filter(None, [note])]))}</pre>' if lines or note else ""
+
+
+def run_html(name: str, result: Mapping[str, Any] | None, *, goes_on: bool) -> str:
+    """Returns the state of a run: that it goes on, or what was claimed and what the referee saw."""
+    if result is None:
+        look, said = ("running", "runs") if goes_on else ("failure", "did not begin, or was killed")
+    else:
+        success = (result.get("referee") or {}).get("success")
+        look = "success" if result.get("outcome") == "success" and success is not False else "failure"
+        said = f"{result.get('outcome')} {result.get('cause') or ''}; the referee: {VERDICTS[success]}"
+    return f'<span class="pill" data-look="{look}">{escape(name)}: {escape(said)}</span>'

@@ -35,7 +35,9 @@ def frame(title: str, here: str) -> None:
 
 def tool(text: str, on_click: Callable[..., Any] | None = None, *, hint: str = "", kind: str = "") -> ui.button:
     """Builds a button in the form of the live page."""
-    button = ui.button(text, on_click=on_click, color=None).props("flat dense no-caps").classes(f"tool {kind}")
+    button = (
+        ui.button(text, on_click=on_click, color=None).props("flat dense no-caps :ripple=false").classes(f"tool {kind}")
+    )
     if hint:
         button.props(f'title="{hint}"')
     return button

@@ -11,9 +11,10 @@ import sys
 import urllib.request
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 from urllib.error import URLError
 from urllib.parse import parse_qs, urlsplit
 
@@ -21,7 +22,8 @@ from skills.inputs.errors import InputError
 
 _PAGE: Final = re.compile(r"The page: (http://\S+)")
 MOST_LINES: Final = 500
-_STOP_S: Final = 15.0
+_MOST_LINE: Final = 10_000_000
+_STOP_S: Final = 8.0
 
 
 @dataclass(frozen=True)
@@ -45,18 +47,24 @@ class RunOptions:
 
 @dataclass
 class Running:
-    """Run of a mission: its process, its last lines, and the address of its live page."""
+    """Run of a mission: its process, its last lines, the address of its live page, and its report once it has ended."""
 
     name: str
     process: asyncio.subprocess.Process
     lines: deque[str] = field(default_factory=lambda: deque(maxlen=MOST_LINES))
     page: str = ""
     note: str = ""
+    result: Mapping[str, Any] | None = None
 
     @property
     def is_over(self) -> bool:
         """Returns whether the process has ended, and with it its live page."""
         return self.process.returncode is not None
+
+    @property
+    def goes_on(self) -> bool:
+        """Returns whether the mission has not ended; the live page stays after its end."""
+        return not self.is_over and self.result is None
 
     async def follow(self, stops: Iterable[str]) -> None:
         """Reads the process's lines until it ends; sets breakpoints at the nodes `stops` once the page is there."""
@@ -66,20 +74,25 @@ class Running:
             if not self.page and (found := _PAGE.search(text)):
                 self.page = found[1]
                 self.note = await asyncio.to_thread(_set_breakpoints, self.page, tuple(stops))
+            elif text.startswith('{"'):
+                self.result = json.loads(text)
             else:
                 self.lines.append(text)
         await self.process.wait()
 
-    async def stop(self) -> None:
-        """Ends the run in order, as Ctrl-C does, and kills it if that takes too long."""
-        for number in (signal.SIGINT, signal.SIGKILL):
+    def stop(self) -> None:
+        """Ends the mission in order, or the live page after it, as Ctrl-C does."""
+        if not self.is_over:
+            os.killpg(self.process.pid, signal.SIGINT)
+
+    async def close(self) -> None:
+        """Ends the mission and its page; kills the process if that takes too long."""
+        for number in (signal.SIGINT, signal.SIGINT, signal.SIGKILL):
             if self.is_over:
                 return
             os.killpg(self.process.pid, number)
-            try:
+            with suppress(TimeoutError):
                 await asyncio.wait_for(asyncio.shield(self.process.wait()), _STOP_S)
-            except TimeoutError:
-                continue
 
 
 class MissionRuns:
@@ -91,14 +104,17 @@ class MissionRuns:
         self._tasks = set[asyncio.Task[None]]()
 
     async def start(self, file: Path, options: RunOptions, stops: Sequence[str] = ()) -> Running:
-        """Starts the mission of a file. Raises InputError while another one runs."""
-        if self.current is not None and not self.current.is_over:
-            raise InputError(f"{self.current.name} runs already", hint="stop it first")
-        command = ["run", str(file), *options.arguments(), "--view", f"--out={self.out}"]
+        """Starts the mission of a file, and closes the page of the one before. Raises InputError while that runs."""
+        if self.current is not None:
+            if self.current.goes_on:
+                raise InputError(f"{self.current.name} runs already", hint="stop it first")
+            await self.current.close()
+        command = ["run", str(file), *options.arguments(), "--view", f"--out={self.out}", "--json"]
         process = await asyncio.create_subprocess_exec(
             *(sys.executable, "-u", "-m", "executive.cli", *command),
             stdout=asyncio.subprocess.PIPE,
             stderr=asyncio.subprocess.STDOUT,
+            limit=_MOST_LINE,
             cwd=file.parent,
             start_new_session=True,
         )
@@ -108,10 +124,10 @@ class MissionRuns:
         task.add_done_callback(self._tasks.discard)
         return self.current
 
-    async def stop(self) -> None:
-        """Stops the current run."""
+    async def close(self) -> None:
+        """Ends the current run."""
         if self.current is not None:
-            await self.current.stop()
+            await self.current.close()
 
 
 def _set_breakpoints(page: str, nodes: Sequence[str]) -> str:

@@ -529,27 +529,21 @@ class WritePage:
         lines = {node.source.line: node.path_id for node in reversed(nodes) if node.source is not None}
         return [lines[line] for line in sorted(self._stops) if line in lines]
 
-    async def _stop(self) -> None:
-        await self._workshop.runs.stop()
-        self._draw_run()
+    def _stop(self) -> None:
+        if (current := self._workshop.runs.current) is not None:
+            current.stop()
 
     def _draw_run(self) -> None:
         current = self._workshop.runs.current
-        going = current is not None and not current.is_over
-        self._start_button.set_enabled(not going)
-        self._stop_button.set_enabled(going)
+        going = current is not None and current.goes_on
+        self._start_button.set_visibility(not going)
+        self._stop_button.set_visibility(current is not None and not current.is_over)
+        self._stop_button.text = "Stop" if going else "Close the page"
         if current is None or not self._run_panel.visible:
             return
-        look = (
-            ("running", "runs")
-            if going
-            else ("success", "done")
-            if current.process.returncode == 0
-            else ("failure", "ended")
-        )
-        self._run_state.content = f'<span class="pill" data-look="{look[0]}">{escape(current.name)} {look[1]}</span>'
+        self._run_state.content = fragments.run_html(current.name, current.result, goes_on=going)
         self._lines.content = fragments.lines_html([*current.lines][-30:], current.note)
-        page = current.page if going else ""
+        page = "" if current.is_over else current.page
         if page != self._shown_page:
             self._shown_page = page
             self._live.content = (

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 import threading
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -19,7 +19,6 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Route, RoutePlanner
 from executive.tree.node import NodeSpec
 from executive.tree.node_view import NodeView, node_view, outline
-from executive.tree.plan import StepPart
 from executive.words.goal import GoalCondition
 from skills.api import PlanningError, Zone
 from skills.footprint import Footprint
@@ -65,20 +64,43 @@ class Leg:
 
 @dataclass(frozen=True)
 class Insight:
-    """Result of checking a text: messages, summary, rows of the trees, judged commands, drives, and the time taken."""
+    """Result of checking a text: messages, summary, the time taken, and what was compiled of the text in `file`."""
 
     messages: tuple[Message, ...] = ()
     summary: str = ""
-    trees: tuple[NodeView, ...] = ()
-    judged: tuple[Judged, ...] = ()
-    legs: tuple[Leg, ...] = ()
     took_s: float = 0.0
-    prepared: Prepared | None = field(default=None, compare=False)
+    file: Path = Path()
+    compiled: tuple[CompiledTree, ...] = ()
+    routes: tuple[tuple[Prepared, tuple[tuple[Pose2D, Pose2D], ...]], ...] = ()
 
     @property
     def errors(self) -> int:
         """Number of errors."""
         return sum(message.is_error for message in self.messages)
+
+    @property
+    def prepared(self) -> Prepared | None:
+        """Mission of the first robot; None if the mission could not be prepared."""
+        return self.routes[0][0] if self.routes else None
+
+    @cached_property
+    def trees(self) -> tuple[NodeView, ...]:
+        """Rows of the trees, as the mission's author wrote them."""
+        return tuple(outline(node_view(tree.root)) for tree in self.compiled)
+
+    @cached_property
+    def judged(self) -> tuple[Judged, ...]:
+        """Commands of all robots with what the referee judges."""
+        return tuple(each for tree in self.compiled for each in _judged(tree, self.file))
+
+    @cached_property
+    def legs(self) -> tuple[Leg, ...]:
+        """Drives for which the check has planned routes."""
+        found = list[Leg]()
+        for prepared, asked in self.routes:
+            nodes = _goals_of(prepared.tree)
+            found += [Leg(start, goal, _line_of(nodes.get(goal), self.file)) for start, goal in asked]
+        return tuple(found[:MOST_LEGS])
 
 
 class _RecordedRoutes:
@@ -86,7 +108,7 @@ class _RecordedRoutes:
 
     def __init__(self, planner: RoutePlanner) -> None:
         self._planner = planner
-        self.asked: dict[tuple[Pose2D, Pose2D], Route | None] = {}
+        self.asked: dict[tuple[Pose2D, Pose2D], Route] = {}
 
     def route(self, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...] = ()) -> Route:
         """Plans a route as the planner does."""
@@ -130,20 +152,13 @@ def _insight(
     lines = file.read_text(encoding="utf-8").splitlines()
     errors = [(error, True) for error in checked.errors] + [(error, False) for error in checked.warnings]
     messages = [_message(error, is_error, file, shown_as, lines) for error, is_error in errors]
-    trees = tuple(node_view(tree.root) for tree in checked.trees)
-    legs = [
-        Leg(start, goal, _line_of(_goals_of(prepared.tree).get(goal), file))
-        for prepared, routes in noted
-        for start, goal in routes.asked
-    ]
     return Insight(
         messages=tuple(sorted(messages, key=lambda each: (each.line, not each.is_error))),
         summary="; ".join(checked.summary) if checked.ok else "",
-        trees=tuple(map(outline, trees)),
-        judged=tuple(_judged(part, tree, file) for tree in checked.trees for part in tree.parts),
-        legs=tuple(legs[:MOST_LEGS]),
         took_s=took_s,
-        prepared=noted[0][0] if noted else None,
+        file=file,
+        compiled=checked.trees,
+        routes=tuple((prepared, tuple(routes.asked)) for prepared, routes in noted),
     )
 
 
@@ -173,11 +188,13 @@ def _goals_of(tree: CompiledTree) -> Mapping[Pose2D, NodeSpec]:
     return found
 
 
-def _judged(part: StepPart, tree: CompiledTree, file: Path) -> Judged:
-    node = next((node for node in tree.root.walk() if node.path_id in (part.path_id, part.node)), None)
-    skill = "" if part.skill is None else f"skill {part.skill.__name__}"
-    said = str(part.command) if part.command is not None else skill
-    return Judged(said, "not judged" if part.goal is None else goal_words(part.goal), _line_of(node, file))
+def _judged(tree: CompiledTree, file: Path) -> Iterator[Judged]:
+    nodes = {node.path_id: node for node in tree.root.walk()}
+    for part in tree.parts:
+        skill = "" if part.skill is None else f"skill {part.skill.__name__}"
+        said = str(part.command) if part.command is not None else skill
+        line = _line_of(nodes.get(part.path_id) or nodes.get(part.node), file)
+        yield Judged(said, "not judged" if part.goal is None else goal_words(part.goal), line)
 
 
 def goal_words(goal: GoalCondition) -> str:
@@ -249,8 +266,3 @@ class _PathPlanner:
         every = max(1, len(path.poses) // 60)
         poses = [*path.poses[::every], path.poses[-1]]
         return tuple((round(float(pose[0]), 3), round(float(pose[1]), 3)) for pose in poses)
-
-
-def without_place(insight: Insight) -> Insight:
-    """Returns an insight without trees and drives, for a text that is checked no more."""
-    return replace(insight, trees=(), judged=(), legs=(), prepared=None)

@@ -371,15 +371,17 @@ class WritePage:
         insight, view = self._insight, self._view
         if insight is None:
             return
-        if view == "Tree":
-            self._seen.content = fragments.tree_html(insight.trees)
-        elif view == "Commands":
-            self._seen.content = fragments.judged_html(insight.judged)
-        else:
-            plan = await run.io_bound(self._workshop.maps.map_of, insight)
-            if view == self._view:
-                self._seen.content = fragments.map_svg(plan)
+        drawn = await run.io_bound(self._drawn, insight, view)
+        if view == self._view and insight is self._insight and drawn is not None:
+            self._seen.content = drawn
         ui.run_javascript("setTimeout(() => studio.mark(), 60)")
+
+    def _drawn(self, insight: Insight, view: str) -> str:
+        if view == "Tree":
+            return fragments.tree_html(insight.trees)
+        if view == "Commands":
+            return fragments.judged_html(insight.judged)
+        return fragments.map_svg(self._workshop.maps.map_of(insight))
 
     # Edits
 

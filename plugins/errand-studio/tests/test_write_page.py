@@ -4,9 +4,9 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
+from studio_user import StudioUser, play, studio
 
 from errand_studio.palette import examples
-from studio_user import StudioUser, play, studio
 
 TEXT = "name: round\n# the round\nsteps:\n  - to: hall  # first\n  - to: kitchen\n"
 Scenario = Callable[[StudioUser], Awaitable[None]]

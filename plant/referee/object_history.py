@@ -3,9 +3,12 @@
 An object's history contains its resting places, lifts and drops.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +18,9 @@ from executive.words.goal import GoalCondition
 from plant.saved_state import Stateful
 from skills.inputs.errors import definite
 from skills.robot import FloatArray, Intrinsics
+
+if TYPE_CHECKING:
+    from plant.worlds.seeding import Placement
 
 LIFT_M = 0.03
 AWAY_M = 0.3
@@ -378,7 +384,8 @@ class Truth:
 
     `given` are the intervals (s) in which an object rested on a person's tray, by object and person. `doors` are the
     times (s) and states of each sliding door by its position (x, y): 0 open, 1 closed, between while it moves. Any
-    other door is open. `hands` are the poses of the robots' hands by robot.
+    other door is open. `hands` are the poses of the robots' hands by robot, and `people` says what each person looks
+    like and answers.
     """
 
     now_s: float
@@ -389,6 +396,7 @@ class Truth:
     doors: Mapping[Point, Sequence[tuple[float, float]]] = field(default_factory=dict)
     pictures: Sequence[TakenPicture] = ()
     hands: Mapping[str, TimedPoses] = field(default_factory=dict)
+    people: Mapping[str, Placement] = field(default_factory=dict)
 
     def ended_s(self, condition: GoalCondition) -> float:
         """Time at which the step that belongs to a condition ended; the present time while it runs."""

@@ -76,6 +76,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         robot's model instance to its kind. Raises ValueError, with the name, for a model that the plant lacks.
         """
         self._plant, self._geometry = plant, plant.get_geometry_query_input_port()
+        self._people = {each.name: each for each in placements if each.name in persons}
         self._entities = Entities.from_plant(plant, placements, robots, persons, scenery)
         self._doors = doors
         self._counter = CollisionCounter(self._entities.all)
@@ -229,6 +230,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
             doors=self._doors(),
             pictures=self._pictures,
             hands={name: TimedPoses(*map(TimedPath, map(_timed, self._hand(name)))) for name in self._entities.hands},
+            people=self._people,
         )
         return judge(conditions, truth, collisions=self._counter.collisions)
 

@@ -42,19 +42,19 @@ def carry_plan(builder: PlanBuilder, meet: NodeSpec | None = None) -> NodeSpec:
     if goal is None:
         raise builder.error(f"it is not said where to take the {item}", "name a place or a person")
     if goal == START:
-        return _hand_over_plan(builder, item, FromBoard(builder.start_key), _person_at_start(builder))
+        return hand_over_plan(builder, item, FromBoard(builder.start_key), _person_at_start(builder))
     person = builder.knowledge.person(goal)
     if person is not None:
         met = person in builder.met and command.goal_at is None
         pose = FromBoard(builder.met_key(person, "-beside")) if met else person_pose(builder, person, command.goal_at)
-        return _hand_over_plan(builder, item, pose, person, meet)
+        return hand_over_plan(builder, item, pose, person, meet)
     place = builder.place(goal)
     put, guards = put_down_plan(builder, item, place)
     skills = tuple(guard.children[0] for guard in guards if guard.children[0].skill is not None)
     return recover_fallen_plan(builder.at("carry-on"), item, f"to the {place}", put, guards, skills)
 
 
-def _hand_over_plan(
+def hand_over_plan(
     builder: PlanBuilder, item: ObjectKind, pose: Pose2D | FromBoard, person: str, meet: NodeSpec | None = None
 ) -> NodeSpec:
     """Carries the item to a person and holds it out; the gripper opens when the person takes it."""

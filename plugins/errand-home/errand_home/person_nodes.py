@@ -189,21 +189,15 @@ def where_text(builder: PlanBuilder, place: str) -> str:
 def _find(builder: PlanBuilder, appearance: Appearance, place: str) -> tuple[NodeSpec, ...]:
     """Goes into the room of a place, looks for a person, and goes to them; at a surface it is the nearest to it."""
     knowledge, met, where = builder.knowledge, builder.met_key(ANYBODY), where_text(builder, place)
-    go, look, people = _look(builder, appearance, place, met, count=0 if place in knowledge.surfaces else 1)
-    chosen = (
-        builder.node(
-            "nearest to",
-            f"who is nearest to the {place}?",
-            part="nearest",
-            people=people,
-            person=met,
-            outline=knowledge.surfaces[place].polygon,
-            where=where,
-        ),
+    surface = knowledge.surfaces.get(place)
+    go, look, people = _look(builder, appearance, place, met, count=1 if surface is None else 0)
+    beside = builder.skill(
+        "meet_person", {"person": ANYBODY, "place_W": PlaceOf(met), "place": knowledge.room(place)}, {"person": met}
     )
-    ports = {"person": ANYBODY, "place_W": PlaceOf(met), "place": knowledge.room(place)}
-    beside = builder.skill("meet_person", ports, {"person": met})
-    return go, look, *(chosen if place in knowledge.surfaces else ()), beside
+    if surface is None:
+        return go, look, beside
+    own = {"people": people, "person": met, "outline": surface.polygon, "where": where}
+    return go, look, builder.node("nearest to", f"who is nearest to the {place}?", part="nearest", **own), beside
 
 
 def _look(

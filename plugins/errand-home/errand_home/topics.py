@@ -21,9 +21,29 @@ _TEAM_WORDS: Final = {"name": "is called", "country": "comes from", "affiliation
 _DATES: Final = ("today", "date", "tomorrow", "day of the week", "day of the month")
 OWN_TOPICS: Final = ("time", *_DATES, "yourself", *(f"{key} of the team" for key in _TEAM_WORDS))
 _COMMON: Final = frozenset(
-    ("a", "an", "the", "is", "are", "was", "were", "do", "does", "did", "of", "in", "on", "at", "to", "for", "how")
+    (
+        "a",
+        "an",
+        "the",
+        "is",
+        "are",
+        "was",
+        "were",
+        "do",
+        "does",
+        "did",
+        "have",
+        "has",
+        "of",
+        "in",
+        "on",
+        "at",
+        "to",
+        "for",
+        "how",
+    )
 ) | {"which", "what", "who", "many", "your"}
-_ENOUGH: Final = 0.6
+_ENOUGH: Final = 0.75
 """Share of the words of a known question that a question must have."""
 _QUESTIONS: Final = (
     (r"\btime\b", "time"),

@@ -1,3 +1,12 @@
-"""Fixtures of the executive's tests: a context for nodes, and what they publish."""
+"""Fixtures of the executive's tests: a context for nodes, a scripted robot, and what they publish."""
 
-from tests.executive.conftest import clock, context, published, robot  # noqa: F401 - fixtures
+from tests.executive.conftest import (  # noqa: F401 - fixtures
+    clock,
+    context,
+    knowledge,
+    published,
+    registry,
+    robot,
+    run_tree,
+    script,
+)

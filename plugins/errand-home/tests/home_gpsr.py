@@ -16,10 +16,10 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
+from home_cast import Cast
 
 from executive import parse
 from executive.app.prepare.worlds import knowledge_of, open_world
-from executive.words.outlines import inside
 from plant.worlds.seeding import place_objects
 from plant.worlds.world import WorldError
 from tests.benchmarks.harness import benchmark, by
@@ -27,6 +27,16 @@ from tests.benchmarks.plant_mission import PlantMission
 
 WORLD, TIME_LIMIT_S, TRIES, CROWDED, MOST_SHOWN = "home", 300.0, 40, 10, 3
 CATEGORIES = {
+    "count people": r"tell me how many (?:people|.*persons) ",
+    "tell of a person": r"tell (?:me )?the (?:name|pose|gesture) of ",
+    "talk": r"(?:tell|say) (?:something|the (?:time|day)|what day|your teams) ",
+    "answer": r"answer ",
+    "follow": r"follow ",
+    "guide": r"(?:guide|escort|lead|take) (?:the person|the \w+ person|[A-Z])",
+    "greet, then": r"(?:greet|salute|say hello to|introduce yourself to) ",
+    "meet, then": r"meet ",
+    "find a person": r"(?:find|locate|look for) a (?:person|\w+ person) ",
+    "go, then a person": r"(?:go|navigate) to .* then (?:meet|(?:find|locate|look for) the (?:person|\w+ person))",
     "count objects": r"tell me how many .*there are",
     "compare objects": r"tell me what (?:is|are) the .*est ",
     "bring me": r"(?:bring|give) me ",
@@ -85,10 +95,8 @@ def arranged(world, knowledge, commands, rng, *, alone):
 
     `alone`: other objects are elsewhere.
     """
-    rules, people, placed = {one.name: one for one in world.seed_rules.objects}, dict[str, str](), dict[str, str]()
+    rules, placed = {one.name: one for one in world.seed_rules.objects}, dict[str, str]()
     for command in commands:
-        if command.goal in knowledge.people and command.goal_at is not None:
-            people[command.goal] = knowledge.room(command.goal_at)
         place = None if command.goal is None else knowledge.place(command.goal)
         if command.task is None or command.puts or place is None or command.object is None:
             continue
@@ -99,21 +107,9 @@ def arranged(world, knowledge, commands, rng, *, alone):
     for name, rule in rules.items():
         free = tuple(each for each in rule.surfaces if each not in taken) or rule.surfaces
         rules[name] = rule.model_copy(update={"surfaces": (placed[name],) if name in placed else free})
-    spots = [pose for one in world.seed_rules.people for pose in one.poses]
-    moved = [one if one.name not in people else moved_to(one, people[one.name], knowledge, spots, rng)
-             for one in world.seed_rules.people]  # fmt: skip
-    changed = {"objects": tuple(rules.values()), "people": tuple(moved)}
+    people = Cast(world, knowledge, rng).play(commands)
+    changed = {"objects": tuple(rules.values()), "people": people}
     return replace(world, seed_rules=world.seed_rules.model_copy(update=changed))
-
-
-def moved_to(rule, room, knowledge, spots, rng):
-    """Rule of a person who stands in a room; the spots of others there are taken where their own have none."""
-    there = [
-        [pose for pose in poses if inside(knowledge.rooms[room], (pose.x, pose.y))] for poses in (rule.poses, spots)
-    ]
-    poses = there[0] or there[1]
-    free = {"distance_m": None, "bearing_rad": None, "turned_rad": None, "pose": None}
-    return rule.model_copy(update={**free, "poses": (poses[int(rng.integers(len(poses)))],)}) if poses else rule
 
 
 def summary(results):

@@ -1,12 +1,13 @@
 """Judges of the tasks on people, by a simulation's truth."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from executive.words.goal import GoalCondition, Region
-from plant.referee.findings import Finding, judge_company, region_at, where
+from plant.referee.findings import Finding, distance_m, judge_company, region_at, where
 from plant.referee.object_history import TimedPath, Truth
 from skills.inputs.errors import count_text
 
@@ -28,12 +29,23 @@ def judge_followed(condition: GoalCondition, truth: Truth) -> Finding:
         away = f", and was over {LOST_M:g} m away for {gone_s:.0f} s" if gone_s else ""
         return Finding(gone_s <= LONGEST_LOSS_S, away)
 
-    return judge_company(condition, truth, NEAR_M, on_the_way)
+    return judge_company(_with_person(condition, truth), truth, NEAR_M, on_the_way)
 
 
 def judge_guided(condition: GoalCondition, truth: Truth) -> Finding:
     """Judges whether the person stands at the goal, and a robot near them."""
-    return judge_company(condition, truth, NEAR_M)
+    return judge_company(_with_person(condition, truth), truth, NEAR_M)
+
+
+def _with_person(condition: GoalCondition, truth: Truth) -> GoalCondition:
+    """Condition of the person who was nearest to a robot when the step began, where it names nobody."""
+    at_s, people, robots = condition.from_s, truth.persons_of(condition), truth.robots_of(condition).values()
+    away_m = [
+        (distance_m(robot.position_at(at_s), path.position_at(at_s)), name)
+        for name, path in people.items()
+        for robot in robots
+    ]
+    return replace(condition, person=min(away_m)[1]) if away_m else condition
 
 
 def lost_s(robot: TimedPath, person: TimedPath, from_s: float, until_s: float) -> float:

@@ -28,8 +28,9 @@ AWAY = {"Robin": walked(0.0, 10.0, y=50.0), "Kim": walked(0.0, 10.0)}
         (FOLLOWED, walked(-1.5, 3.0), {"Robin": walked(0.0, 4.5)}, False, "not in the office"),
         (FOLLOWED, walked(-1.5, 8.5), AWAY, False, ""),
         (ANYONE, walked(-1.5, 8.5), {"Robin": walked(0.0, 10.0), "Kim": path((50.0, 0.0, 0.0))}, True, ""),
+        (ANYONE, walked(-1.5, 8.5), {"Robin": walked(2.0, 10.0), "Kim": path((-2.0, 0.0, 0.0))}, False, "from Kim"),
     ],
-    ids=["behind", "far away", "outside the room", "behind somebody else", "anyone"],
+    ids=["behind", "far away", "outside the room", "behind somebody else", "anyone", "not the one before the robot"],
 )
 def test_a_robot_behind_the_person_who_stands_in_the_room_has_followed(condition, robot, people, success, why):
     found = finding(condition, robot, **people)

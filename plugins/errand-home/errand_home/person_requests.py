@@ -1,5 +1,6 @@
 """Requests about people who are described, and about what to say to people."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
@@ -61,7 +62,7 @@ def _seeks(row: Builder, request: Match) -> None:
 def _goes_along(row: Builder, request: Match) -> None:
     """Adds finding the person, and following or guiding them."""
     to = request["to"]
-    place = row.reader.place(to, row.state) if to and to.lower() not in ("here", "back") else START if to else None
+    place = _place(row, to) if to and to.lower() not in ("here", "back") else START if to else None
     _puts_seek(row, request)
     task = task_named(request["does"])
     does = Command(goal=place, task=task, object=ObjectKind(ANYBODY), verb=_verb(request))
@@ -77,7 +78,7 @@ def _puts_seek(row: Builder, request: Match, at: str = "at") -> None:
     words, said = request["who"], request.text
     appearance = require(appearance_of(words), f"I do not understand whom '{words}' describes", words)
     last = row.state.goal if row.reader.is_place(row.state.goal) else None
-    found = row.reader.place(request[at], row.state) if request[at] else last
+    found = _place(row, request[at]) if request[at] else last
     place = require(found, f"{said}: in which room?", question=True)
     seek = _command(Seek.word, description(appearance), request, goal=place)
     memory = replace(row.state.memory, person=named(ANYBODY), place=named(place, NounKind.PLACE))
@@ -127,7 +128,7 @@ def _counts(row: Builder, request: Match) -> None:
     words = request["who"]
     words = words if appearance_of(words) else f"people {words}"
     appearance = require(appearance_of(words), f"I do not understand whom '{words}' describes", words)
-    place = row.reader.place(request["at"], row.state)
+    place = _place(row, request["at"])
     require(place in row.reader.knowledge.rooms, f"{request.text}: people are counted in rooms; name one", place)
     counted = f"number of {plural_description(appearance)} in the {place}"
     _puts(row, _command(Report.word, counted, request, goal=START))
@@ -135,7 +136,7 @@ def _counts(row: Builder, request: Match) -> None:
 
 def _informs(row: Builder, request: Match) -> None:
     """Adds finding out the name, the pose or the gesture of the person at a place, and telling it."""
-    place, where = row.reader.place(request["at"], row.state), request["where"]
+    place, where = _place(row, request["at"]), request["where"]
     goal: str | None = START
     if request["name"]:
         goal = row.reader.knowledge.person(request["name"])
@@ -143,11 +144,11 @@ def _informs(row: Builder, request: Match) -> None:
         hint = "tell it to me, to somebody by name, or to the person at a place"
         plain = appearance_of(request["who"]) == Appearance()
         require(where and plain, f"I do not understand to whom to tell it in '{request.text}'; {hint}", request["who"])
-        goal = row.reader.place(where, row.state)
+        goal = _place(row, where)
     else:
         require(request["speaker"] or not request["them"], f"{request.text}: to whom?", question=True)
     at = where if request["name"] and where else ""
-    spot = row.reader.place(at, row.state) if at else None
+    spot = _place(row, at) if at else None
     on = "in" if place in row.reader.knowledge.rooms else "at"
     asked = f"{request['info'].lower()} of the {_ONE} {on} the {place}"
     _puts(row, replace(_command(Report.word, asked, request, goal=goal), goal_at=spot))
@@ -157,7 +158,7 @@ def _hands(row: Builder, request: Match) -> None:
     """Adds handing an object to a described person, in place of the speaker."""
     words, said = request["who"], request.text
     appearance = require(appearance_of(words), f"I do not understand whom '{words}' describes", words)
-    row.plain.append(Clause(" and ", f"{_verb(request)} it to me"))
+    row.plain.append(Clause(" and ", f"{_verb(request)} {request['thing']} to me"))
     row.flush()
     brought = row.steps[-1].commands[-1] if row.steps and row.steps[-1].commands else Command()
     held = brought.item if brought.goal == START else None
@@ -165,9 +166,18 @@ def _hands(row: Builder, request: Match) -> None:
     row.steps.pop()
     before = [command for step in row.steps for command in step.commands]
     at = next((one.goal for one in reversed(before) if row.reader.is_place(one.goal)), None)
-    place = row.reader.place(request["at"], row.state) if request["at"] else at
+    place = _place(row, request["at"]) if request["at"] else at
     known = require(place, f"{said}: in which room?", question=True)
     _puts(row, replace(_command(Deliver.word, description(appearance), request, goal=known), item=item))
+
+
+def _place(row: Builder, said: str) -> str:
+    """Place that words name, and nothing else. Raises RefusalError for more words."""
+    plain = re.sub(r"^(?:the|my|our|your) ", "", said, flags=re.IGNORECASE)
+    place = row.reader.place(said, row.state)
+    whole = row.reader.knowledge.place(plain) == place or plain.lower() == "there"
+    require(whole, f"I do not understand the place '{said}'", said)
+    return place
 
 
 def _command(word: str, text: str, request: Match, *, goal: str | None = None) -> Command:

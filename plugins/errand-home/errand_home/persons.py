@@ -14,7 +14,7 @@ _GESTURE: Final = (
     r"|pointing (?:to|towards) (?:the|their) (?P<points>left|right)"
 )
 _CLOTHES: Final = (
-    r"(?:wearing|dressed in|in) (?:a |an |the )?(?P<colour>red|orange|yellow|green|blue|white|gr[ae]y|black)"
+    r"(?:wearing|dressed in|in|with) (?:a |an |the )?(?P<colour>red|orange|yellow|green|blue|white|gr[ae]y|black)"
     r"(?: (?P<clothes>clothes|t[ -]?shirts?|shirts?|blouses?|sweaters?|coats?|jackets?|tops?))?"
 )
 _FIRST: Final = re.compile(rf"(?P<first>waving|sitting|standing|lying|seated) {_PEOPLE}", re.IGNORECASE)

@@ -105,7 +105,8 @@ def arranged(world, knowledge, commands, rng, *, alone):
             placed[name] = str(rng.choice(knowledge.surfaces_in(place)))
     taken = {*placed.values()} if alone else set()
     for name, rule in rules.items():
-        free = tuple(each for each in rule.surfaces if each not in taken) or rule.surfaces
+        free = [each for each in rule.surfaces if each not in taken] or [*rule.surfaces]
+        free = tuple(map(str, rng.permutation(free)))  # another try draws other surfaces
         rules[name] = rule.model_copy(update={"surfaces": (placed[name],) if name in placed else free})
     people = Cast(world, knowledge, rng).play(commands)
     changed = {"objects": tuple(rules.values()), "people": people}

@@ -31,6 +31,8 @@ from skills.descriptions import count_of, distinct_objects
 
 ANSWER_WITHIN_S: Final = 15.0
 """Time for a person to say their name or a question."""
+WITHIN_M: Final = 2.15
+"""Greatest distance from a person, on a bed or behind furniture, where no nearer pose is free."""
 _PLAIN: Final[Mapping[str, object]] = MappingProxyType(
     {"keys": MappingProxyType({}), "names": MappingProxyType({}), "options": (), "default": None, "gives": str}
 )
@@ -191,9 +193,9 @@ def _find(builder: PlanBuilder, appearance: Appearance, place: str) -> tuple[Nod
     knowledge, met, where = builder.knowledge, builder.met_key(ANYBODY), where_text(builder, place)
     surface = knowledge.surfaces.get(place)
     go, look, people = _look(builder, appearance, place, met, count=1 if surface is None else 0)
-    beside = builder.skill(
-        "meet_person", {"person": ANYBODY, "place_W": PlaceOf(met), "place": knowledge.room(place)}, {"person": met}
-    )
+    within = builder.optional_ports("meet_person", {"within_m": WITHIN_M})
+    ports = {"person": ANYBODY, "place_W": PlaceOf(met), "place": knowledge.room(place), **within}
+    beside = builder.skill("meet_person", ports, {"person": met})
     if surface is None:
         return go, look, beside
     own = {"people": people, "person": met, "outline": surface.polygon, "where": where}

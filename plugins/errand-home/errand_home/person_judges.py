@@ -73,7 +73,7 @@ def judge_reported(condition: GoalCondition, truth: Truth) -> tuple[bool, str]:
     last, said_s = _last_words(condition)
     heard, asked = _listener(condition, truth, said_s), about_people(condition.wanted)
     if asked is None:
-        due = condition.classes
+        due = ("a time of day",) if condition.wanted == "time" else condition.classes
         right = last in due or (condition.wanted == "time" and _CLOCK.fullmatch(last) is not None)
     elif asked.appearance is not None:
         due = (str(len(_people_at(condition.source[:1], (), asked.appearance, truth, said_s))),)

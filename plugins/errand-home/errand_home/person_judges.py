@@ -9,7 +9,7 @@ import numpy as np
 
 from errand_home.persons import appearance_of
 from errand_home.topics import about_people
-from errand_people.looks import Appearance, gesture_text
+from errand_people.looks import Appearance, Colour, Gesture, Pose, gesture_text
 from executive.words.command import START
 from executive.words.goal import GoalCondition, Region
 from executive.words.outlines import distance_m
@@ -36,10 +36,10 @@ def true_appearance(person: str, truth: Truth) -> Appearance:
     """What a person looks like: the colour is that of the dye nearest to the clothes."""
     placement = truth.people.get(person)
     figure = (None if placement is None else placement.figure) or Figure()
-    if figure.clothes is None:
-        return Appearance(figure.posture, figure.gesture)
-    colour = min((math.dist(dye, figure.clothes), name) for name, dye in CLOTHES.items())[1]
-    return Appearance(figure.posture, figure.gesture, colour)
+    pose, gesture, worn = Pose(figure.posture), Gesture(figure.gesture), figure.clothes
+    if worn is None:
+        return Appearance(pose, gesture)
+    return Appearance(pose, gesture, Colour(min((math.dist(dye, worn), name) for name, dye in CLOTHES.items())[1]))
 
 
 def fits(person: str, wanted: Appearance, truth: Truth) -> bool:
@@ -158,4 +158,4 @@ def _trait(person: str, info: str, truth: Truth) -> str:
     own = true_appearance(person, truth)
     if info == "name":
         return f"called {person}"
-    return str(own.pose) if info == "pose" else gesture_text(own.gesture or "none")
+    return str(own.pose) if info == "pose" else gesture_text(own.gesture or Gesture.NONE)

@@ -11,7 +11,7 @@ from py_trees.common import Status
 from errand_home.facts import Facts, QuizAnswer, facts_of
 from errand_home.persons import appearance_of, description, plural_description
 from errand_home.topics import OWN_TOPICS, AboutPeople, about_people, answer_to, name_in, own_sentence, unknown_fact
-from errand_people.looks import Appearance, gesture_text
+from errand_people.looks import Appearance, Gesture, Trait, gesture_text
 from errand_people.nodes import PlaceOf
 from executive.tree.behaviour import Explained, ExplainedLeaf
 from executive.tree.board import FromBoard
@@ -150,8 +150,8 @@ class AboutPerson(Statement):
     def update(self) -> Status:
         """Writes the sentence."""
         value = str(self.context.board.get(self.value))
-        called = self.topic == "name"
-        said = f"called {name_in(value, self.names)}" if called else gesture_text(value)
+        said = f"called {name_in(value, self.names)}" if self.topic == "name" else value
+        said = gesture_text(Gesture(value)) if self.topic == "gesture" else said
         return self.tell(f"the {self.topic} of the person {self.where}", f"The person {self.where} is {said}")
 
 
@@ -212,7 +212,7 @@ def _look(
     )
     ports = {"area_W": builder.knowledge.rooms[room], "place": room, "person": f"the {description(appearance)}"}
     outputs = {"people": people} if count == 0 else {"person": key}
-    traits: dict[str, object] = dict(appearance.traits().items())
+    traits: dict[str, object] = {str(trait): value for trait, value in appearance.traits().items()}
     look = builder.skill("find_person", {**ports, "count": count, **traits}, outputs)
     return go, look, people
 
@@ -257,7 +257,7 @@ def _found_out(builder: PlanBuilder, asked: AboutPeople, text: str) -> tuple[Nod
     if asked.info == "name":
         learn = _question(builder, "What is your name?", value)
     else:
-        traits = {"traits": (asked.info,), "place_W": PlaceOf(builder.met_key(ANYBODY))}
+        traits = {"traits": (Trait(asked.info),), "place_W": PlaceOf(builder.met_key(ANYBODY))}
         ports = {"person": ANYBODY, "place": builder.knowledge.room(asked.place), **traits}
         learn = builder.skill("read_person", ports, {asked.info: value})
     own = {"facts": Facts(), "robot": "", "key": text, "value": value, "where": where}

@@ -73,6 +73,21 @@ def _goes_along(row: Builder, request: Match) -> None:
     row.put(steps_of_commands((does,)), after if place is not None else after.elsewhere)
 
 
+def _introduces(row: Builder, request: Match) -> None:
+    """Adds guiding one person to the room of another, and introducing them to each other."""
+    knowledge, said = row.reader.knowledge, request.text
+    one, other = (knowledge.person(request[slot]) for slot in ("one", "other"))
+    first, second = require(one, said, said), require(other, said, said)
+    require(first != second, f"'{said}' names one person twice; name two", said)
+    at = _place(row, request["at"]) if request["at"] else None
+    where = _place(row, request["where"]) if request["where"] else knowledge.room(knowledge.people[second].at)
+    meets, joins = Command(goal=first, goal_at=at), Command(goal=second, goal_at=where)
+    guides = Command(goal=where, task=task_named("guide"), object=ObjectKind(first), verb=_verb(request))
+    row.state = row.state.recalling(person=named(second), place=named(where, NounKind.PLACE))
+    _puts(row, meets, guides, joins)
+    row.put((Speak(speak=f"{second}, this is {first}. {first}, this is {second}."),), row.state)
+
+
 def _puts_seek(row: Builder, request: Match, at: str = "at") -> None:
     """Adds finding a described person at a place, by default where the robot is then."""
     words, said = request["who"], request.text
@@ -201,7 +216,7 @@ def _puts(row: Builder, *commands: Command) -> None:
 
 _ACTS: Final = {
     **{"seek": _seeks, "follow": _goes_along, "guide": _goes_along, "report": _reports, "answer": _answers},
-    **{"count": _counts, "inform": _informs, "hand": _hands},
+    **{"introduce": _introduces, "count": _counts, "inform": _informs, "hand": _hands},
 }
 _BESIDE: Final = (Seek.word, Report.word, Answer.word, Deliver.word)
 """Tasks after which the robot is beside a person."""

@@ -1,9 +1,9 @@
 """Descriptions of people by pose, gesture or colour of clothes, as a command names them: "waving person"."""
 
 import re
-from typing import Any, Final, get_args
+from typing import Final
 
-from errand_people.looks import KINDS_NOTE, Appearance, Colour, gesture_text
+from errand_people.looks import KINDS_NOTE, Appearance, Colour, Gesture, Pose, gesture_text
 from skills.world_model import PERSON
 
 _PEOPLE: Final = r"(?:persons?|people|guests?|visitors?|somebody|someone)"
@@ -22,7 +22,6 @@ _BEHIND: Final = re.compile(
     rf"{_PEOPLE}(?:(?: (?:who|that) (?:is|are))? (?:(?:{_POSE})|{_GESTURE}|{_CLOTHES}))?", re.IGNORECASE
 )
 _PLAIN_WORDS: Final = {"seated": "sitting", "gray": "grey"}
-COLOURS: Final = get_args(Colour)
 
 
 def appearance_of(words: str) -> Appearance | None:
@@ -41,14 +40,12 @@ def appearance_of(words: str) -> Appearance | None:
 
 
 def _appearance(trait: str) -> Appearance:
-    trait, given = _PLAIN_WORDS.get(trait, trait), dict[str, Any]()
-    if trait in COLOURS:
-        given["clothes_colour"] = trait
-    elif trait in ("sitting", "standing", "lying"):
-        given["pose"] = trait
-    elif trait:
-        given["gesture"] = trait
-    return Appearance(**given)
+    trait = _PLAIN_WORDS.get(trait, trait)
+    if trait in [*Colour]:
+        return Appearance(clothes_colour=Colour(trait))
+    if trait in [*Pose]:
+        return Appearance(pose=Pose(trait))
+    return Appearance(gesture=Gesture(trait)) if trait else Appearance()
 
 
 def kind_of_clothing(words: str) -> str:

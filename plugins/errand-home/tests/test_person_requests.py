@@ -13,7 +13,10 @@ from tests.tables import yaml_beside
 
 SENTENCES = yaml_beside(__file__, "person_sentences.yaml")
 PAGE = Page(
-    "persons", file=Path(errand_home.__file__).with_name("persons.yaml"), names=("Robin",), around=("desk", "kitchen")
+    "persons",
+    file=Path(errand_home.__file__).with_name("persons.yaml"),
+    names=("Robin", "Jane"),
+    around=("desk", "kitchen"),
 )
 ROWS = PAGE.table["intents"]["requests"]
 

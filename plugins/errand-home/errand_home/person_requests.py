@@ -37,6 +37,7 @@ def about_persons(row: Builder, clause: Clause) -> bool:
         return True
     request = require(forms.fullmatch(text), text)
     row.at += joined.index(text)
+    row.special = True  # a refusal of the clauses before is theirs
     if request["does"] != "hand":
         row.flush()
     _ACTS[request["does"]](row, request)

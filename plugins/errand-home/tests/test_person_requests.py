@@ -71,7 +71,20 @@ def test_the_answer_notes_that_the_colour_decides():
     assert notes == ("the kind of clothing is not told apart; in 'people wearing red coats' the colour decides",)
 
 
-@pytest.mark.parametrize("sentence", ["go to the person in the kitchen", "follow me", "greet everybody in the kitchen"])
+@pytest.mark.parametrize(
+    "sentence",
+    [
+        "go to the person in the kitchen",
+        "follow me",
+        "follow the person standing in front of you",
+        "greet everybody in the kitchen",
+    ],
+)
 def test_other_sentences_about_people_keep_their_meaning(sentence):
-    commands = parsed(sentence).commands
-    assert not any(each.task is not None and each.task.word == "seek" for each in commands)
+    found = parsed(sentence)
+    assert found.status.name == "OK", found.reason
+    assert not any(each.task is not None and each.task.word == "seek" for each in found.commands)
+
+
+def test_a_clause_before_is_refused_by_its_own_reason():
+    assert "coat" in (parsed("bring me a coat and tell me the time").reason or "")

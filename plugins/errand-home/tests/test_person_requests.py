@@ -74,7 +74,6 @@ def test_the_answer_notes_that_the_colour_decides():
 @pytest.mark.parametrize(
     "sentence",
     [
-        "go to the person in the kitchen",
         "follow me",
         "follow the person standing in front of you",
         "greet everybody in the kitchen",

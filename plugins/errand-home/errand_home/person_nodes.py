@@ -19,7 +19,7 @@ from executive.tree.context import ANSWER_TOPIC, RunContext
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.carry import hand_over_plan
 from executive.tree.nodes.command_plans import go_to_goal
-from executive.tree.nodes.pick_up import go_into_plan
+from executive.tree.nodes.pick_up import go_into_plan, go_near_plan
 from executive.tree.nodes.search import Answer
 from executive.tree.plan import PlanBuilder
 from executive.words.command import START
@@ -189,32 +189,43 @@ def where_text(builder: PlanBuilder, place: str) -> str:
 
 
 def _find(builder: PlanBuilder, appearance: Appearance, place: str) -> tuple[NodeSpec, ...]:
-    """Goes into the room of a place, looks for a person, and goes to them; at a surface it is the nearest to it."""
+    """Goes to a place, looks for a person in its room, and goes to them.
+
+    At a surface, the robot begins where it sees the surface; anybody there is the one nearest to it.
+    """
     knowledge, met, where = builder.knowledge, builder.met_key(ANYBODY), where_text(builder, place)
-    surface = knowledge.surfaces.get(place)
-    go, look, people = _look(builder, appearance, place, met, count=1 if surface is None else 0)
+    surface, described = knowledge.surfaces.get(place), bool(appearance.traits())
+    chooses = surface is not None and not described
+    look, people = _look(builder, appearance, place, met, count=0 if chooses else 1)
     within = builder.optional_ports("meet_person", {"within_m": WITHIN_M})
     ports = {"person": ANYBODY, "place_W": PlaceOf(met), "place": knowledge.room(place), **within}
     beside = builder.skill("meet_person", ports, {"person": met})
-    if surface is None:
-        return go, look, beside
+    if surface is None or not chooses:
+        return _go(builder, place), look, beside
     own = {"people": people, "person": met, "outline": surface.polygon, "where": where}
-    return go, look, builder.node("nearest to", f"who is nearest to the {place}?", part="nearest", **own), beside
+    nearest = builder.node("nearest to", f"who is nearest to the {place}?", part="nearest", **own)
+    return _go(builder, place), look, nearest, beside
 
 
-def _look(
-    builder: PlanBuilder, appearance: Appearance, place: str, key: str, *, count: int
-) -> tuple[NodeSpec, NodeSpec, str]:
-    """Drive into the room of a place, search for people there, and the key for all of them; 0 counts everybody."""
+def _go(builder: PlanBuilder, place: str) -> NodeSpec:
+    """Drives into a room, or to where the robot sees a surface; it looks from where it gets."""
+    pose = builder.knowledge.place_pose(place).pose_2d()
+    is_room = place in builder.knowledge.rooms
+    go = go_into_plan(builder, place) if is_room else go_near_plan(builder, pose, f"the {place}")
+    return builder.or_stay(f"go to the {place}, if possible", go, "it looks from here", part="go")
+
+
+def _look(builder: PlanBuilder, appearance: Appearance, place: str, key: str, *, count: int) -> tuple[NodeSpec, str]:
+    """Search for people in the room of a place, and the key for all of them; a `count` of 0 finds everybody."""
     room, people = builder.knowledge.room(place), builder.key("people")
-    go = builder.or_stay(
-        f"go into the {room}, if possible", go_into_plan(builder, room), "it looks from here", part="go"
-    )
-    ports = {"area_W": builder.knowledge.rooms[room], "place": room, "person": f"the {description(appearance)}"}
-    outputs = {"people": people} if count == 0 else {"person": key}
+    ports: dict[str, object] = {"area_W": builder.knowledge.rooms[room], "place": room, "count": count}
     traits: dict[str, object] = {str(trait): value for trait, value in appearance.traits().items()}
-    look = builder.skill("find_person", {**ports, "count": count, **traits}, outputs)
-    return go, look, people
+    if not traits:
+        ports |= {"person": ANYBODY, **builder.optional_ports("find_people", {"moves": True})}
+        return builder.skill("find_people", ports, {"observation": key, "observations": people}), people
+    outputs = {"people": people} if count == 0 else {"person": key}
+    who = {"person": f"the {description(appearance)}"}
+    return builder.skill("find_person", {**ports, **who, **traits}, outputs), people
 
 
 def report_plan(builder: PlanBuilder) -> NodeSpec:
@@ -276,12 +287,12 @@ def _count(builder: PlanBuilder, appearance: Appearance, room: str, text: str) -
     """Counts the people of an appearance in a room, and writes the sentence under a key."""
     if room not in builder.knowledge.rooms:
         raise builder.error(f"people are counted in rooms, and '{room}' is none", "name the room")
-    go, look, people = _look(builder, appearance, room, builder.key("person"), count=0)
+    look, people = _look(builder, appearance, room, builder.key("person"), count=0)
     several, where = plural_description(appearance), where_text(builder, room)
     return builder.node(
         "people count",
         f"how many {several} are {where}?",
-        builder.sequence(f"look about the {room}", go, look, part="search"),
+        builder.sequence(f"look about the {room}", _go(builder, room), look, part="search"),
         question=f"the number of {several} {where}",
         denied=f"no {several} {where}",
         looks=MappingProxyType({room: (look.path_id,)}),

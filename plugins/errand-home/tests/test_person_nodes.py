@@ -76,6 +76,12 @@ def people(script, registry, robot):
             return Failed(Cause.POSTCONDITION, f"{asked.person} is not seen in the {asked.place}")
         return Succeeded("found", {"person": found[0], "people": tuple(found)})
 
+    def find_people(skill):
+        found = [seen(x, y, room) for x, y, room, _ in there.values() if room == skill.inputs.place]
+        if not found:
+            return Failed(Cause.POSTCONDITION, f"nobody is seen in the {skill.inputs.place}")
+        return Succeeded("found", {"observation": found[0], "observations": tuple(found), "unexplained": ()})
+
     def fits(own, wanted):
         return wanted.traits().items() <= own.traits().items()
 
@@ -95,7 +101,13 @@ def people(script, registry, robot):
         robot.standing = skill.inputs.goal
         return Succeeded("there")
 
-    script.ends |= {"find_person": find, "meet_person": meet, "read_person": read, "navigate": drive}
+    script.ends |= {
+        "find_person": find,
+        "find_people": find_people,
+        "meet_person": meet,
+        "read_person": read,
+        "navigate": drive,
+    }
     return there
 
 

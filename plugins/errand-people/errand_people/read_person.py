@@ -26,7 +26,7 @@ class ReadPersonInputs:
 class ReadPerson(PeopleLookingSkill[ReadPersonInputs]):
     """Looks at a person, also from other sides, until what was asked for is sure; or says what is not.
 
-    The outputs are the person, each trait as a word, and a sentence on those that were asked for.
+    The outputs are the person, each trait as a word (empty if not asked for), and a sentence on those asked for.
     """
 
     name = "read_person"
@@ -62,7 +62,7 @@ class ReadPerson(PeopleLookingSkill[ReadPersonInputs]):
             raise SkillFailure(Cause.POSTCONDITION, f"nobody is seen at {place_text(place_W)}")
         shown = seen.appearance.only(inputs.traits)
         outputs: dict[str, object] = {"person": self.observation(seen, inputs.person, inputs.place)}
-        outputs.update({str(trait): value for trait, value in shown.traits().items()})
+        outputs |= dict.fromkeys(map(str, TRAITS), "") | {str(trait): value for trait, value in shown.traits().items()}
         unsure = [trait.replace("_", " ") for trait in inputs.traits if trait not in shown.traits()]
         text = f"{who} is {shown.text()}" + (f"; {KINDS_NOTE}" if shown.clothes_colour is not None else "")
         if unsure:

@@ -42,7 +42,7 @@ def test_robot_tells_what_one_look_shows_without_driving():
     done = read([WAVES])
     assert isinstance(done.step, Succeeded), done.step
     assert done.step.message == "Kim is sitting, waving"
-    assert {"pose": "sitting", "gesture": "waving"}.items() <= done.step.outputs.items()
+    assert {"pose": "sitting", "gesture": "waving", "clothes_colour": ""}.items() <= done.step.outputs.items()
     assert done.step.outputs["person"].surface == "corridor"
     assert len(done.skill.from_W) == 1
 

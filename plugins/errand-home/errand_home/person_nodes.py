@@ -269,7 +269,8 @@ def _found_out(builder: PlanBuilder, asked: AboutPeople, text: str) -> tuple[Nod
         learn = _question(builder, "What is your name?", value)
     else:
         traits = {"traits": (Trait(asked.info),), "place_W": PlaceOf(builder.met_key(ANYBODY))}
-        ports = {"person": ANYBODY, "place": builder.knowledge.room(asked.place), **traits}
+        room = builder.knowledge.room(asked.place)
+        ports = {"person": ANYBODY, "place": room, "area_W": builder.knowledge.rooms[room], **traits}
         learn = builder.skill("read_person", ports, {asked.info: value})
     own = {"facts": Facts(), "robot": "", "key": text, "value": value, "where": where}
     names = tuple(builder.knowledge.people)

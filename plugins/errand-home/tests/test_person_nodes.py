@@ -47,6 +47,7 @@ class ReadPersonInputs:
     traits: tuple[str, ...]
     place: str = ""
     place_W: tuple[float, float] | None = None
+    area_W: object = ()
 
 
 @pytest.fixture(autouse=True)

@@ -83,7 +83,7 @@ class FindPerson(PeopleLookingSkill[FindPersonInputs]):
 
     def run(self, inputs: FindPersonInputs) -> Routine[Succeeded]:
         """Looks round from one position after another, and at each person found."""
-        wanted = Appearance(inputs.pose, inputs.gesture, inputs.clothes_colour)
+        wanted, self.room_W = Appearance(inputs.pose, inputs.gesture, inputs.clothes_colour), inputs.area_W
         asked: Sequence[Trait] = tuple(wanted.traits())
         known = [(one.position_W[0], one.position_W[1]) for one in inputs.avoid]
         found, others, unsure, stood = list[ObjectObservation](), list[str](), list[str](), list[Pose2D]()

@@ -12,7 +12,7 @@ from errand_people.appearance import PICTURES_S, Look
 from errand_people.looks import Appearance, LookedAt, Trait
 from skills.api import Cause, InputsT, ObjectKind, ObjectObservation
 from skills.footprint import footprint_clear
-from skills.geometry import bearing_rad, facing_poses, line_of_sight, wrap
+from skills.geometry import bearing_rad, facing_poses, inside_polygon, line_of_sight, wrap
 from skills.manipulation.approach.base_placement import go_to_one
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import overview_viewpoints
@@ -50,6 +50,8 @@ class PeopleLookingSkill(LookingSkill[InputsT]):
 
     needs_camera = True
     look_options: LookOptions = LookOptions()
+    room_W: tuple[tuple[float, float], ...] = ()
+    """Outline of the room in which the robot stays while it looks; empty: it may go anywhere."""
 
     def looked_at(
         self, place_W: tuple[float, float], who: str, asked: Sequence[Trait], wanted: Appearance | None = None
@@ -137,11 +139,16 @@ class PeopleLookingSkill(LookingSkill[InputsT]):
         free = list[Pose2D]()
         for apart_m in options.apart_m:
             poses = (pose for pose in facing_poses(place_W, here, apart_m) if footprint_clear(costmap, footprint, pose))
-            other = (pose for pose in poses if self._is_other(pose, sides_rad) and self._sees(pose, place_W))
+            near = (pose for pose in poses if self._is_in_room(pose) and self._is_other(pose, sides_rad))
+            other = (pose for pose in near if self._sees(pose, place_W))
             free += [*islice(other, _POSES_EACH)]
         if not free:
             raise SkillFailure(Cause.PLANNING, f"there is no free place to look at {who} from")
         yield from go_to_one(self, [NavigateInputs(pose, 0.2, 0.3) for pose in free])
+
+    def _is_in_room(self, pose: Pose2D) -> bool:
+        """Returns whether a pose is in the room in which the robot stays."""
+        return not self.room_W or bool(inside_polygon(np.array([(pose.x_m, pose.y_m)]), self.room_W)[0])
 
     def _is_other(self, pose: Pose2D, sides_rad: Sequence[float]) -> bool:
         """Returns whether a pose that faces a person does so from another side."""

@@ -15,12 +15,16 @@ from skills.routine import Routine, SkillFailure
 
 @dataclass(frozen=True)
 class ReadPersonInputs:
-    """Names of a person and their room, the point (x, y) where they are (None: the nearest one ahead), and traits."""
+    """Names of a person and their room, the point (x, y) where they are (None: the nearest one ahead), and traits.
+
+    `area_W` is the outline of a room that the robot does not leave (empty: it may).
+    """
 
     person: str
     place_W: tuple[Coordinate, Coordinate] | None = None
     place: str = ""
     traits: tuple[Trait, ...] = TRAITS
+    area_W: tuple[tuple[Coordinate, Coordinate], ...] = ()
 
 
 class ReadPerson(PeopleLookingSkill[ReadPersonInputs]):
@@ -50,7 +54,7 @@ class ReadPerson(PeopleLookingSkill[ReadPersonInputs]):
 
     def run(self, inputs: ReadPersonInputs) -> Routine[Succeeded]:
         """Looks at the person until all traits are sure."""
-        who, place_W = person_text(inputs.person), inputs.place_W
+        who, place_W, self.room_W = person_text(inputs.person), inputs.place_W, inputs.area_W
         if place_W is None:
             meet = MeetPerson(self.context)
             met = yield from self.perform(meet, MeetPersonInputs(inputs.person, None, inputs.place))

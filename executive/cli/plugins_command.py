@@ -124,8 +124,14 @@ def _named(name: str, known: Mapping[str, Any]) -> Any:
 def _show_whole(name: str, kind: type, rows: Iterable[tuple[str, Any, Any]]) -> None:
     """Prints a name, the docstring of its class, and a table of names with their types and defaults."""
     typer.echo(f"{name}: {inspect.cleandoc(kind.__doc__ or '')}\n")
-    words = [(port, describe_type(hint), str(default)) for port, hint, default in rows]
+    words = [(port, _plain(describe_type(hint)), str(default)) for port, hint, default in rows]
     show_table(console_for(as_json=False), ("name", "type", "default"), words)
+
+
+def _plain(words: str) -> str:
+    """Returns the words for a type without names of Python's types."""
+    named = re.sub(r"collections\.abc\.Mapping\[.*?\]", "names to values", words).replace("Path", "path")
+    return re.sub(r"Literal\[(.*?)\]", lambda found: found[1].replace("'", "").replace(", ", " or "), named)
 
 
 def _rows(found: Sequence[Plugin]) -> Iterator[tuple[str, ...]]:

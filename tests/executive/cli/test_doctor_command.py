@@ -88,6 +88,7 @@ def test_skills_are_listed_with_their_inputs():
         (["stack", "show", "planner"], ["planner:", "use: lattice"]),
         (["stack", "show", "planner", "--options"], ["planner lattice: ", "margin_m  number from 0 to 10 m  0.06"]),
         (["stack", "show", "lattice", "--options"], ["planner lattice: "]),
+        (["stack", "show", "onnx", "--options"], ["letterbox or corner or stretch or native or nothing", "file  path"]),
         (["stack", "show", "navigate", "--options"], ["skills navigate: ", "doors.reach_m  number above 0"]),
     ],
 )

@@ -64,10 +64,9 @@ def test_every_test_link_and_file_of_a_page_exists(page):
     assert missing == {"tests": [], "links": [], "files": []}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=page_id)
-def test_every_command_and_option_of_a_page_exists(page):
-    shown = commands(page) + _ERRAND.findall(text_of(page))
-    assert [fault for line in shown if (fault := unknown_command(line))] == []
+def test_every_command_and_option_of_the_pages_exists():
+    shown = {page_id(page): commands(page) + _ERRAND.findall(text_of(page)) for page in PAGES}
+    assert [(page, fault) for page, lines in shown.items() for line in lines if (fault := unknown_command(line))] == []
 
 
 def test_the_named_poses_of_the_page_on_pictures_are_free_in_the_flat(tmp_path):

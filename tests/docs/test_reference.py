@@ -21,10 +21,9 @@ def test_the_pages_are_written_as_markdown(tmp_path, monkeypatch):
     assert {path.name: path.read_text(encoding="utf-8") for path in tmp_path.iterdir()} == PAGES
 
 
-@pytest.mark.parametrize("name", sorted(PAGES))
-def test_a_page_has_a_title_and_tables_or_code(name):
-    assert PAGES[name].startswith("# ")
-    assert "\n|---|" in PAGES[name] or "```" in PAGES[name]
+def test_each_page_has_a_title_and_tables_or_code():
+    assert [name for name, text in PAGES.items() if not text.startswith("# ")] == []
+    assert [name for name, text in PAGES.items() if "\n|---|" not in text and "```" not in text] == []
 
 
 @pytest.mark.parametrize("page", make_reference.SCHEMA_PAGES, ids=lambda page: page.name)

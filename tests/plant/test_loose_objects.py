@@ -1,6 +1,7 @@
 """Loose objects sleep at rest and wake before a contact; carried objects follow the hand."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from pydrake.systems.analysis import Simulator
 
 from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
-from plant.loose_objects import FASTEST_M_S, FASTEST_SPIN_RAD_S, CarriedObjects, arc_m
+from plant.loose_objects import FASTEST_M_S, FASTEST_SPIN_RAD_S, CarriedObjects, Sleepers, arc_m
 from plant.models.catalogue import load_catalogue
 from plant.robots.robot_kind import PlacedRobot
 from skills.robot import Pose2D
@@ -137,6 +138,21 @@ def hand_shapes(engine):
 def test_a_hand_far_from_everything_costs_no_search_for_contacts(stage):
     shapes, searched = hand_shapes(stage(0.1, robots=ALICE))
     assert (len(shapes) > 50, searched) == (True, [])
+
+
+def test_a_hand_may_have_links_without_collision_shapes(stage, monkeypatch):
+    engine = stage(0.1, robots=ALICE)
+    world = engine.world
+    robot = world.robots["Alice"]
+    bare = next(
+        body.name()
+        for body in map(world.plant.get_body, world.plant.GetBodyIndices(robot.instance))
+        if not world.plant.GetCollisionGeometriesForBody(body)
+    )
+    links = (*robot.kind.gripper_links, bare)
+    monkeypatch.setattr(robot, "kind", replace(robot.kind, gripper_links=links))
+    Sleepers(world, engine.root_context).update(0.0)
+    assert hand_shapes(engine)[1] == []
 
 
 def test_a_sleeping_hand_touches_an_object_that_comes_and_never_its_own_arm(stage):

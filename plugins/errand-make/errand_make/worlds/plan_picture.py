@@ -19,7 +19,7 @@ _Colour = tuple[int, int, int]
 WIDTH_PX = 1400
 _WIDEST_PX, _CLEAR_PX_PER_M = 2600, 55
 _CLOSEST_PX_PER_M = 30
-_RIM_PX, _TICK_PX, _ROW_PX = 44, 8, 26
+_RIM_PX, _TICK_PX, _ROW_PX, _AXIS_PX = 44, 8, 26, 66
 _ABOVE_M = 10.0
 _TINTS = ((214, 232, 246), (250, 228, 208), (220, 242, 214), (246, 216, 226), (238, 234, 200), (226, 216, 244))
 _SURFACE, _TOP, _LINE = (160, 120, 70), (240, 224, 196), (120, 120, 120)
@@ -120,7 +120,8 @@ def _draw_coordinates(view: MapView, *, whole: bool) -> None:
         if whole:
             cv2.line(picture, (x, top), (x, bottom), _LINE, 1)
         cv2.line(picture, (x, bottom), (x, bottom + _TICK_PX), _INK, 2)
-        _write_small(picture, f"{metre}", (x, bottom + 22))
+        if x < width - _AXIS_PX:
+            _write_small(picture, f"{metre}", (x, bottom + 22))
     for metre in _metres((y_zero - bottom) / scale, (y_zero - top) / scale, step):
         y = round(y_zero - metre * scale)
         if whole:

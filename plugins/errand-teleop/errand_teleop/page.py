@@ -48,9 +48,12 @@ class TeleopPage:
     def report(self) -> None:
         """Sends the robot's state and, when they are due, a picture and what the robot does not obey."""
         pose, now_s, note = self._hands.pose(), self._context.clock.now(), self._hands.note
-        base = [pose.base.x_m, pose.base.y_m, pose.base.yaw_rad]
+        base, joints_rad = (
+            [round(each, 2) + 0.0 for each in numbers]  # the page would show a small negative number as -0.00
+            for numbers in ((pose.base.x_m, pose.base.y_m, pose.base.yaw_rad), pose.joints_rad)
+        )
         own = {"robot": self._context.robot.name, "note": note, "base": base}
-        self._feed.tell("teleop", {**own, "joints_rad": list(pose.joints_rad), "opening": pose.opening, "now_s": now_s})
+        self._feed.tell("teleop", {**own, "joints_rad": joints_rad, "opening": pose.opening, "now_s": now_s})
         self._log.write()
         if note and note != self._note:
             self._tell("refused", note)

@@ -160,10 +160,7 @@ class ActionClient:
         self._result = node.client(f"{base}/get_result", f"{type_name}_GetResult")
 
     def send(self, goal: Any, *, limit_s: float) -> SentGoal | None:
-        """Sends a goal or its fields; returns None when the server rejects it.
-
-        Raises TimeoutError when no answer comes: the goal may be pursued.
-        """
+        """Sends a goal or its fields; None when the server rejects it. Raises TimeoutError: it may be pursued."""
         sent = SentGoal({"uuid": np.frombuffer(uuid.uuid4().bytes, np.uint8)})
         answer = self._send.call({"goal_id": sent.identity, "goal": goal}, limit_s=limit_s)
         if answer is None:

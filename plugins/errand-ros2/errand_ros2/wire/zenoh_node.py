@@ -174,10 +174,13 @@ class ZenohNode(Node):
     def _watch(self, name: str) -> None:
         """Compares the types in which a topic is published."""
 
+        lock = threading.Lock()  # since each timer is a thread
+
         def compare(key: str) -> None:
-            if key not in (known := self.types[name]):
-                self.compare(name, key if (theirs := types.ros_name(key)) in known else theirs)
-                known.append(key)
+            with lock:
+                if key not in (known := self.types[name]):
+                    self.compare(name, key if (theirs := types.ros_name(key)) in known else theirs)
+                    known.append(key)
 
         def found(token: zenoh.Sample) -> None:
             timer = threading.Timer(_SETTLED_S, compare, ("/".join(str(token.key_expr).split("/")[-3:-1]),))

@@ -15,6 +15,7 @@ fetch: fetch_drink on a served robot with the seeds 1 to COUNT, or from FIRST on
     the robot's process, judges the goal conditions, which the run's process sends over a pipe.
 """
 
+import atexit
 import json
 import math
 import os
@@ -429,6 +430,7 @@ class Errand:
         self.said = Path(tempfile.mkstemp(dir=folder)[1])
         command = [sys.executable, "-m", "executive.cli", *words]
         self.process = subprocess.Popen(command, stdout=self.said.open("w"), stderr=subprocess.STDOUT)
+        atexit.register(self.process.kill)
 
     def says(self, words, limit_s=120.0):
         from ros_client import soon

@@ -6,7 +6,7 @@ import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack
 from dataclasses import replace
 from importlib.util import find_spec
 from types import SimpleNamespace
@@ -227,21 +227,21 @@ def test_random_bytes_from_rclpy_are_dropped_and_counted(capfd):
 
 
 # A header alone, with the padding that it tells: Fast CDR would read memory behind it; a velocity, shorter or longer.
-@pytest.mark.parametrize("padding", [0, 3])
 @pytest.mark.parametrize("data", [*(bytes([0, 1, 0, padding]) for padding in range(4)), b"", bytes(51), bytes(56)])
-def test_bytes_of_another_length_are_no_velocity(data, padding):
+def test_bytes_of_another_length_are_no_velocity(data):
     twist = ros_types().message("geometry_msgs/msg/Twist")
-    assert twist.decode(bytes(52)) == twist.decode(bytes(52 + padding), padding)
-    with pytest.raises(MalformedError):
-        twist.decode(data, padding)
+    for padding in (0, 3):
+        assert twist.decode(bytes(52)) == twist.decode(bytes(52 + padding), padding)
+        with pytest.raises(MalformedError):
+            twist.decode(data, padding)
 
 
-@pytest.mark.parametrize("length", [5, 6, 8])
-def test_only_a_wire_that_fills_messages_up_allows_bytes_behind_them(length):
+def test_only_a_wire_that_fills_messages_up_allows_bytes_behind_them():
     flag = ros_types().message("std_msgs/msg/Bool")
-    assert flag.decode(bytes(length), 3).data is False
-    with nullcontext() if length == 5 else pytest.raises(MalformedError, match=f"{length} bytes are no std_msgs"):
-        flag.decode(bytes(length))
+    assert flag.decode(bytes(5)) == flag.decode(bytes(8), 3)
+    for length in (6, 8):
+        with pytest.raises(MalformedError, match=f"{length} bytes are no std_msgs/msg/Bool"):
+            flag.decode(bytes(length))
 
 
 def test_malformed_requests_get_no_answer_and_do_no_harm(router, other):

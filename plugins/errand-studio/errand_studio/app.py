@@ -22,6 +22,7 @@ from errand_studio.write_page import WritePage
 from executive.view.serving import open_port, url_of
 from skills.inputs.errors import InputError
 
+HOST: Final = "127.0.0.1"
 MOST_MESSAGE: Final = 3_000_000
 
 
@@ -52,24 +53,23 @@ def register(workshop: Workshop) -> None:
         return {"from": start, "options": options}
 
 
-def serve(workshop: Workshop, address: tuple[str, int], tell: Callable[[str], None]) -> None:
-    """Serves the studio until Ctrl-C; `tell` gets the address. Raises InputError if the address cannot be used."""
+def serve(workshop: Workshop, port: int, tell: Callable[[str], None]) -> None:
+    """Serves the studio on 127.0.0.1 until Ctrl-C; `tell` gets the address. Raises InputError if the port is taken."""
     try:
-        opened = open_port(*address)
+        opened = open_port(HOST, port)
     except OSError as error:
-        what = f"cannot serve the page at {address[0][:60]} port {address[1]} ({error.strerror})"
-        raise InputError(what, hint="name another --view-host or --view-port") from error
-    host, port = opened.getsockname()[:2]
+        what = f"cannot serve the page at port {port} ({error.strerror})"
+        raise InputError(what, hint="name another --view-port") from error
     token = secrets.token_urlsafe(24)
     register(workshop)
     site = FastAPI(openapi_url=None, lifespan=None)
     ui.run_with(site, title="errand studio", dark=None, show_welcome_message=False, tailwind=False)
     logging.getLogger("nicegui").setLevel(logging.ERROR)
     core.sio.eio.max_http_buffer_size = MOST_MESSAGE
-    nicegui_app.on_startup(lambda: tell(f"The studio: {url_of(address[0], port)}?token={token}"))
+    nicegui_app.on_startup(lambda: tell(f"The studio: {url_of(*opened.getsockname()[:2])}?token={token}"))
     nicegui_app.on_shutdown(workshop.runs.close)
     config = uvicorn.Config(
-        Guard(site, token, host),
+        Guard(site, token),
         log_level="critical",
         access_log=False,
         ws_max_size=MOST_MESSAGE,

@@ -12,6 +12,7 @@ from starlette.responses import PlainTextResponse, RedirectResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 COOKIE: Final = "errand_studio"
+_HOST: Final = re.compile(r"(127\.0\.0\.1|localhost)(:\d+)?", re.ASCII | re.IGNORECASE)
 MOST_BODY: Final = 2_000_000
 _MISSING: Final = "Open the page by the address that errand has printed: its token is missing or old."
 _POLICY: Final = (
@@ -26,12 +27,11 @@ class Guard:
     """ASGI application that lets requests with the token through to another one.
 
     The first request has the token in its address; its answer moves the token to a cookie. A request with another host
-    than this machine's loopback or `host`, or from another origin, is refused, and so is a body of over `MOST_BODY`.
+    than this machine's loopback, or from another origin, is refused, and so is a body of over `MOST_BODY` bytes.
     """
 
-    def __init__(self, app: ASGIApp, token: str, host: str = "127.0.0.1") -> None:
+    def __init__(self, app: ASGIApp, token: str) -> None:
         self._app, self._token = app, token
-        self._hosts = re.compile(rf"(127\.0\.0\.1|localhost|\[::1\]|{re.escape(host)})(:\d+)?", re.IGNORECASE)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Handles a request or a websocket."""
@@ -59,7 +59,7 @@ class Guard:
 
     def _is_own(self, connection: HTTPConnection) -> bool:
         host, origin = connection.headers.get("host", ""), connection.headers.get("origin")
-        return self._hosts.fullmatch(host) is not None and origin in (None, f"http://{host}")
+        return _HOST.fullmatch(host) is not None and origin in (None, f"http://{host}")
 
     def _has(self, token: str | None) -> bool:
         return token is not None and secrets.compare_digest(token.encode(), self._token.encode())

@@ -98,8 +98,8 @@ class Running:
 class MissionRuns:
     """Runs that a studio has started: one at a time."""
 
-    def __init__(self, out: Path) -> None:
-        self.out = out
+    def __init__(self, out: Path, live_port: int = 0) -> None:
+        self.out, self._live_port = out, live_port
         self.current: Running | None = None
         self._tasks = set[asyncio.Task[None]]()
 
@@ -109,7 +109,8 @@ class MissionRuns:
             if self.current.goes_on:
                 raise InputError(f"{self.current.name} runs already", hint="stop it first")
             await self.current.close()
-        command = ["run", str(file), *options.arguments(), "--view", f"--out={self.out}", "--json"]
+        command = ["run", str(file), *options.arguments(), "--view", f"--view-port={self._live_port}"]
+        command += [f"--out={self.out}", "--json"]
         process = await asyncio.create_subprocess_exec(
             *(sys.executable, "-u", "-m", "executive.cli", *command),
             stdout=asyncio.subprocess.PIPE,

@@ -22,10 +22,11 @@ _WORLD: Final = re.compile(r"^world:[ ]*([^#\n]+)", re.MULTILINE)
 class Workshop:
     """State that all browsers of a studio share: folder, checks, runs."""
 
-    def __init__(self, folder: Path, out: Path) -> None:
+    def __init__(self, folder: Path, out: Path, *, live_port: int = 0) -> None:
+        """`live_port` is that of the live page of runs; 0 takes a free one."""
         self.folder, self.out = MissionFolder(folder), out.resolve()
         self.checks, self.maps = MissionChecks(), PlanMaps()
-        self.runs, self.table = MissionRuns(self.out), RunsTable(self.out)
+        self.runs, self.table = MissionRuns(self.out, live_port), RunsTable(self.out)
         self._known: dict[str, Knowledge] = {}
 
     @cached_property

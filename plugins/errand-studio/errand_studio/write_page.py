@@ -57,8 +57,7 @@ class WritePage:
             self._build_views()
         self._build_run()
         self._notice.set_visibility(False)
-        self._examples = examples(self._workshop.names(None))
-        self._palette.content = fragments.palette_html(self._examples)
+        self._draw_palette()
         ui.on("studio", self._event)
         names = self._folder.names()
         first = name if name in names else next(iter(names), "")
@@ -337,8 +336,16 @@ class WritePage:
     def _draw_insight(self, insight: Insight) -> None:
         self._state.content = fragments.state_html(insight)
         self._messages.content = fragments.messages_html(insight.messages, insight.summary)
+        self._draw_palette()
         self._draw_outline()
         self._decorate()
+
+    def _draw_palette(self) -> None:
+        """Shows examples with the names of the mission's world."""
+        found = examples(self._workshop.names(self._insight))
+        if found != self._examples:
+            self._examples = found
+            self._palette.content = fragments.palette_html(found)
 
     def _decorate(self) -> None:
         """Marks the lines of the editor that have messages or breakpoints."""

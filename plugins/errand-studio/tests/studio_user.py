@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import re
 from collections.abc import AsyncIterator, Callable, Coroutine
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any, Final
@@ -94,5 +95,6 @@ async def studio(folder: Path, out: Path | None = None) -> AsyncIterator[StudioU
 
 
 def play(scenario: Callable[[], Coroutine[Any, Any, None]]) -> None:
-    """Runs a scenario."""
-    asyncio.run(scenario())
+    """Runs a scenario in a thread of its own, since a browser's tests occupy the event loop of the main one."""
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(lambda: asyncio.run(scenario())).result()

@@ -24,14 +24,16 @@
   };
 
   // The innermost step on a line, and everything that stands for it.
+  const stepAt = (line) => rows().filter((row) => row.dataset.list === "0" && +row.dataset.line <= line && line <= +row.dataset.end).pop();
   function mark(line) {
     studio.line = line;
-    const on = rows().filter((row) => row.dataset.list === "0" && +row.dataset.line <= line && line <= +row.dataset.end).pop();
+    const on = stepAt(line);
     studio.path = on ? pathOf(on) : null;
     all(".chosen[data-line]").forEach((each) => each.classList.remove("chosen"));
     if (!on) return;
     for (const each of all(`[data-line="${on.dataset.line}"]`)) if (each !== on && !each.closest(".outline")) each.classList.add("chosen");
     on.classList.add("chosen");
+    rows().forEach((row) => { row.tabIndex = row === on ? 0 : -1; });
   }
   studio.mark = () => mark(studio.line);
 
@@ -68,6 +70,14 @@
     mark(1);
   };
 
+  // A click on the number of a line sets a breakpoint at its step.
+  document.addEventListener("click", (event) => {
+    const gutter = event.target.closest(".cm-lineNumbers .cm-gutterElement");
+    if (!gutter) return;
+    const step = stepAt(+gutter.textContent);
+    if (step) send("stop line", { at: +step.dataset.line });
+  });
+
   document.addEventListener("click", (event) => {
     const on = event.target.closest("[data-stop],[data-fix],[data-pick],[data-file],[data-sort],[data-run],[data-mission],[data-do],[data-line]");
     if (!on) return;
@@ -98,6 +108,7 @@
       if (next) { event.preventDefault(); next.focus(); if (outline) goTo(+next.dataset.line); }
       return;
     }
+    if (event.key === "b" && on.matches(".row") && stepAt(+on.dataset.line)) send("stop line", { at: +stepAt(+on.dataset.line).dataset.line });
     if (!outline || on.dataset.list === "1") return;
     const keys = { Delete: "remove", d: "double", w: "wrap", b: "break", ArrowUp: "up", ArrowDown: "down", ArrowRight: "in", ArrowLeft: "out" };
     const what = keys[event.key];
@@ -137,6 +148,8 @@
   document.addEventListener("dragend", () => { clear(); dragged = null; });
   studio.redrawn = () => { // after the server has drawn the outline again
     studio.mark();
+    const first = document.querySelector(".outline li.chosen") || rows()[0];
+    if (first) first.tabIndex = 0;
     if (studio.focused && document.activeElement === document.body) rows().find((row) => row.dataset.path === studio.focused)?.focus();
   };
   studio.focus = (path) => { studio.focused = JSON.stringify(path); };

@@ -425,17 +425,20 @@ def _rows(lines: _Text, node: yaml.Node, path: KeyPath, depth: int) -> Iterator[
     """Yields the rows of all steps below a node."""
     below = list(_lists(node, path))
     own = [each for each in below if not any(_is_below(each.path, other.path) for other in below)]
+    kind = node.value[0][0].value if path and isinstance(node, yaml.MappingNode) else ""
     for each in own:
-        shown = len(own) > 1 or each.key.value != "steps" or depth > 0
+        is_main = each.key.value in (kind, "steps") if path else len(own) == 1
+        shown = not (is_main and each.items)
         if shown:
             first, name = each.key.start_mark.line + 1, " ".join(map(str, each.path[len(path) :]))
             yield Row(each.path, depth, "", name, "" if each.items else "empty", first, lines.last_line(each.node) + 1)
         for n, item in enumerate(each.items):
             step, line = (*each.path, n), item.start_mark.line + 1
-            kind, said, more = _said(lines, item)
+            first_key, said, more = _said(lines, item)
             last = lines.end(each, n) if each.is_block else lines.last_line(item) + 1
-            yield Row(step, depth + shown, kind, said, more, line, last)
-            yield from _rows(lines, item, step, depth + shown + 1)
+            inner = depth + shown
+            yield Row(step, inner, first_key, said, more, line, last)
+            yield from _rows(lines, item, step, inner + 1)
 
 
 def _is_below(path: KeyPath, other: KeyPath) -> bool:

@@ -93,6 +93,9 @@ def _task_example(word: str, names: Names) -> Example:
     if word == "to":
         return Example("to", "Goes to a place, a person or the start.", _item({"to": place}))
     task = installed_tasks()[word]
+    about = str(type(task).__doc__ or "").split("\n")[0]
+    if task.samples and (task.answers or task.object_is is Part.TEXT):  # only words say what is meant
+        return Example(word, about, _item({"say": task.samples[0]}))
     step: dict[str, Any] = {"do": word}
     known = {Part.PERSON: names.people, Part.THING: names.objects, Part.TIME: ("10 s",), Part.NUMBER: (2,)}
     if task.goal_is is not Part.NOTHING:
@@ -100,7 +103,7 @@ def _task_example(word: str, names: Names) -> Example:
     if task.object_is is not Part.NOTHING:
         step["object"] = next(iter(known.get(task.object_is, ())), "anything")
     key = f"do {word}" if word in STEP_KEYS else word
-    return Example(key, str(type(task).__doc__ or "").split("\n")[0], _item(step))
+    return Example(key, about, _item(step))
 
 
 def _resolved(schema: Mapping[str, Any]) -> Mapping[str, Any]:

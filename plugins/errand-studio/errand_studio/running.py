@@ -15,7 +15,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
-from urllib.error import URLError
 from urllib.parse import parse_qs, urlsplit
 
 from skills.inputs.errors import InputError
@@ -36,6 +35,11 @@ class RunOptions:
     scenario: str = ""
     faults: str = ""
     people: int = 0
+
+    @property
+    def keeps_nodes(self) -> bool:
+        """Returns whether the run has the nodes of the check: other robots have other names, and so other nodes."""
+        return not (self.world.strip() or self.robots.strip())
 
     def arguments(self) -> list[str]:
         """Returns the arguments for `errand run`; each line of `faults` is one fault."""
@@ -73,7 +77,7 @@ class Running:
             text = line.decode("utf-8", "replace").rstrip()
             if not self.page and (found := _PAGE.search(text)):
                 self.page = found[1]
-                self.note = await asyncio.to_thread(_set_breakpoints, self.page, tuple(stops))
+                self.note = await asyncio.to_thread(_set_breakpoints, self.page, tuple(stops)) or self.note
             elif text.startswith('{"'):
                 self.result = json.loads(text)
             else:
@@ -120,6 +124,8 @@ class MissionRuns:
             start_new_session=True,
         )
         self.current = Running(file.name, process)
+        if stops and not options.keeps_nodes:
+            stops, self.current.note = (), "No breakpoints are set where world or robots are not the mission's own."
         task = asyncio.create_task(self.current.follow(stops))
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
@@ -136,12 +142,13 @@ def _set_breakpoints(page: str, nodes: Sequence[str]) -> str:
     parts = urlsplit(page)
     token = parse_qs(parts.query).get("token", [""])[0]
     for node in nodes:
-        body: Mapping[str, str] = {"node": node}
-        request = urllib.request.Request(
-            f"http://{parts.netloc}/action/break", json.dumps(body).encode(), {"x-errand-token": token}
-        )
-        try:
-            urllib.request.urlopen(request, timeout=5.0).close()
-        except (URLError, OSError) as error:
-            return f"no breakpoint at {node}: {error}"
+        body = json.dumps({"node": node}).encode()
+        request = urllib.request.Request(f"http://{parts.netloc}/action/break", body, {"x-errand-token": token})
+        for last in (False, False, True):
+            try:
+                urllib.request.urlopen(request, timeout=5.0).close()
+                break
+            except OSError as error:  # a run that begins may be too busy to answer in time
+                if last:
+                    return f"no breakpoint at {node}: {error}"
     return ""

@@ -10,8 +10,8 @@ from errand_studio.palette import Names, examples
 from executive.app.prepare.worlds import knowledge_of, open_world
 
 TEXT = "name: round\nsteps:\n  - to: hall\n  - say: bring me a beer from the kitchen\n"
-MISPLACED = frozenset({"use", "place", "compare"})
-"""Examples that need another file, an object in the gripper, or a measure."""
+MISPLACED = frozenset({"use", "place", "answer"})
+"""Examples that need another file, an object in the gripper, or a person of another world."""
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from html import escape
 from typing import Any, Final
 
 from nicegui import events, run, ui
@@ -15,13 +14,11 @@ from errand_studio.checking import Insight
 from errand_studio.folder import ConflictError, Opened
 from errand_studio.layout import frame, refused, tool
 from errand_studio.palette import Example, examples
-from errand_studio.running import RunOptions
+from errand_studio.run_panel import RunPanel
 from errand_studio.workshop import Workshop
 from executive import parse
-from executive.app.prepare.mission_files import shipped_missions
 from executive.language.understand import Status
 from executive.words.steps import steps_to_yaml
-from plant.worlds.world import known_worlds
 from skills.inputs.errors import InputError
 from skills.inputs.yaml_source import KeyPath
 
@@ -44,7 +41,7 @@ class WritePage:
         self._insight: Insight | None = None
         self._stops: set[int] = set()
         self._examples: list[Example] = []
-        self._view, self._shown_page = _VIEWS[0], ""
+        self._view = _VIEWS[0]
 
     async def build(self, name: str) -> None:
         """Builds the page, and opens a file."""
@@ -55,7 +52,7 @@ class WritePage:
             self._build_files()
             self._build_editor()
             self._build_views()
-        self._build_run()
+        self._run_panel = RunPanel(self._workshop.runs, self._start, self._show_run)
         self._notice.set_visibility(False)
         self._draw_palette()
         ui.on("studio", self._event)
@@ -149,35 +146,6 @@ class WritePage:
                     "click",
                     js_handler=f'() => emitEvent("studio", {{what: "wrap in", kind: "{kind}", path: studio.path}})',
                 )
-
-    def _build_run(self) -> None:
-        with ui.element("section").classes("panel grow") as self._run_panel:
-            with ui.element("div").classes("head"):
-                ui.html("<h2>Run</h2>", sanitize=False)
-                self._run_state = ui.html("", sanitize=False)
-                ui.element("span").classes("spring")
-                self._start_button = tool("Start", self._start, kind="main")
-                self._stop_button = tool("Stop", self._stop, kind="stop", hint="Ends the run in order")
-                tool("Back to the text", self._show_run)
-            with ui.element("div").classes("form"):
-                worlds = {
-                    "": "world: as the mission says",
-                    **{name: f"world: {name}" for name in sorted(known_worlds())},
-                }
-                scenarios = sorted(next(iter(shipped_missions().values())).parent.glob("scenarios/*.yaml"))
-                named = {"": "no scenario", **{str(file): f"scenario: {file.stem}" for file in scenarios}}
-                self._world = ui.select(worlds, value="").props("dense outlined")
-                self._scenario = ui.select(named, value="").props("dense outlined")
-                self._robots = ui.input(placeholder="robots: as the mission says; or alice=spot,bob=fetch")
-                self._robots.props("dense outlined")
-                self._seed = ui.number(prefix="seed", value=1, min=0, max=2_147_483_647, precision=0).props(
-                    "dense outlined"
-                )
-                self._people = ui.number(prefix="people", value=0, min=0, max=8, precision=0).props("dense outlined")
-                self._faults = ui.input(placeholder="fault: camera.hand: dropout 5 s at 20 s").props("dense outlined")
-            self._live = ui.html("", sanitize=False).classes("grow").style("display:flex;min-height:0")
-            self._lines = ui.html("", sanitize=False).style("max-height:26%;overflow:auto;flex:none")
-        self._run_panel.set_visibility(False)
 
     # Files
 
@@ -273,7 +241,7 @@ class WritePage:
 
     async def _look(self) -> None:
         """Keeps the draft, takes over what others have saved, and shows the run's lines."""
-        self._draw_run()
+        self._run_panel.draw()
         name = self._file.name
         if not name:
             return
@@ -506,30 +474,22 @@ class WritePage:
     # Running
 
     def _show_run(self) -> None:
-        shown = not self._run_panel.visible
-        self._run_panel.set_visibility(shown)
+        shown = not self._run_panel.is_shown
+        self._run_panel.show(shown)
         self._work.set_visibility(not shown)
         self._run_button.text = "Text" if shown else "Run"
-        self._draw_run()
 
     async def _start(self) -> None:
         if self._is_dirty and not self._save():
             return
-        if not self._run_panel.visible:
+        if not self._run_panel.is_shown:
             self._show_run()
-        options = RunOptions(
-            world=str(self._world.value or ""),
-            seed=int(self._seed.value or 0),
-            robots=str(self._robots.value or ""),
-            scenario=str(self._scenario.value or ""),
-            faults=str(self._faults.value or ""),
-            people=int(self._people.value or 0),
-        )
         try:
-            await self._workshop.runs.start(self._folder.file(self._file.name), options, self._stop_nodes())
+            file = self._folder.file(self._file.name)
+            await self._workshop.runs.start(file, self._run_panel.options, self._stop_nodes())
         except InputError as error:
             refused(error)
-        self._draw_run()
+        self._run_panel.draw()
 
     def _stop_nodes(self) -> list[str]:
         """Path ids of the steps on the lines with breakpoints."""
@@ -537,27 +497,6 @@ class WritePage:
         nodes = [node for tree in trees for _, node in tree.walk() if node.step and node.source is not None]
         lines = {node.source.line: node.path_id for node in reversed(nodes) if node.source is not None}
         return [lines[line] for line in sorted(self._stops) if line in lines]
-
-    def _stop(self) -> None:
-        if (current := self._workshop.runs.current) is not None:
-            current.stop()
-
-    def _draw_run(self) -> None:
-        current = self._workshop.runs.current
-        going = current is not None and current.goes_on
-        self._start_button.set_visibility(not going)
-        self._stop_button.set_visibility(current is not None and not current.is_over)
-        self._stop_button.text = "Stop" if going else "Close the page"
-        if current is None or not self._run_panel.visible:
-            return
-        self._run_state.content = fragments.run_html(current.name, current.result, goes_on=going)
-        self._lines.content = fragments.lines_html([*current.lines][-30:], current.note)
-        page = "" if current.is_over else current.page
-        if page != self._shown_page:
-            self._shown_page = page
-            self._live.content = (
-                f'<iframe class="live" title="live page" src="{escape(page)}"></iframe>' if page else ""
-            )
 
 
 def _path(value: Any) -> KeyPath | None:

@@ -78,7 +78,8 @@ class RunPanel:
         going = current is not None and current.goes_on
         self._start_button.set_visibility(not going)
         self._stop_button.set_visibility(current is not None and not current.is_over)
-        self._stop_button.text = "Stop" if going else "Close the page"
+        stopping = current is not None and current.is_stopping
+        self._stop_button.text = "Close the page" if not going else "End at once" if stopping else "Stop"
         if current is None or not self.is_shown:
             return
         self._state.content = fragments.run_html(current.name, current.result, goes_on=going)
@@ -92,3 +93,4 @@ class RunPanel:
     def _stop(self) -> None:
         if (current := self._runs.current) is not None:
             current.stop()
+            self.draw()

@@ -59,6 +59,7 @@ class Running:
     page: str = ""
     note: str = ""
     result: Mapping[str, Any] | None = None
+    is_stopping: bool = False
 
     @property
     def is_over(self) -> bool:
@@ -85,7 +86,8 @@ class Running:
         await self.process.wait()
 
     def stop(self) -> None:
-        """Ends the mission in order, or the live page after it, as Ctrl-C does."""
+        """Ends the mission in order, or at once at the second call, or the live page after it, as Ctrl-C does."""
+        self.is_stopping = True
         if not self.is_over:
             os.killpg(self.process.pid, signal.SIGINT)
 

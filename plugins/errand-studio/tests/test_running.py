@@ -4,6 +4,7 @@ import asyncio
 from pathlib import Path
 
 import pytest
+from studio_user import play
 
 from errand_studio.running import MissionRuns, RunOptions
 from skills.inputs.errors import InputError
@@ -38,7 +39,7 @@ def test_a_mission_that_is_refused_says_why(tmp_path: Path) -> None:
         assert "a.yaml:3" in running.lines[-1]
         assert not running.goes_on
 
-    asyncio.run(scenario())
+    play(scenario)
 
 
 @pytest.mark.mission
@@ -63,4 +64,4 @@ def test_a_run_has_a_live_page_breakpoints_and_an_end(tmp_path: Path) -> None:
         assert running.result is not None
         assert [said["text"] for said in running.result["said"]] == ["One."]
 
-    asyncio.run(asyncio.wait_for(scenario(), 300))
+    play(scenario)

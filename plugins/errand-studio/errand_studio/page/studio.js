@@ -95,8 +95,11 @@
     }
   });
 
+  document.addEventListener("mousedown", (event) => { if (!event.target.closest(".outline")) studio.focused = null; });
   document.addEventListener("keydown", (event) => {
-    const on = event.target.closest?.(".outline li, .messages li, .files li, .row, table.rows tr");
+    // While the server draws the outline again, its focused step is on no element.
+    const last = event.target === document.body && rows().find((row) => row.dataset.path === studio.focused);
+    const on = last || event.target.closest?.(".outline li, .messages li, .files li, .row, table.rows tr");
     if ((event.ctrlKey || event.metaKey) && event.key === "s") { event.preventDefault(); send("save"); return; }
     if ((event.ctrlKey || event.metaKey) && event.key === "Enter") { event.preventDefault(); send("run"); return; }
     if (!on || event.target.matches("button, input")) return;

@@ -167,7 +167,7 @@ def _abreast(points: FloatArray) -> list[FloatArray]:
     off = points[:, :2] - points[:, :2].mean(axis=0)
     along = off @ np.linalg.svd(off, full_matrices=False)[2][0]
     width = float(np.ptp(along))
-    count = math.ceil(width / _SHOULDERS_M) if width > _BODY_WIDTH_M[1] else 1
+    count = math.ceil(width / _SHOULDERS_M) if width > _WIDTH_M[1] else 1
     if not 1 < count <= _MOST_ABREAST:
         return [points]
     numbers = np.minimum((along - along.min()) * count // width, count - 1)

@@ -39,7 +39,7 @@ _OFF_AXIS_RAD = 0.2
 """Largest angle between the optical axis and the point to look at."""
 _IN_VIEW_RAD = 0.5
 """The same for a camera that is fixed to the body."""
-NO_HEAD = HeadCapabilities(("", ""), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
+_NO_HEAD = HeadCapabilities(("", ""), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
 """Stands for a head that does not move."""
 _NEAREST_M = 0.25
 """Least distance from the head's camera to the point to look at."""
@@ -115,7 +115,7 @@ class LookingSkill(ArmSkill[InputsT]):
             low_m, high_m = can.height_range_m
             yield from self.stand_at(min(max(can.standing_height_m + raised_m, low_m), high_m), message)
         try:
-            pan_rad, tilt_rad = head_angles(head or NO_HEAD, camera, self.X_WB().inverse() @ p_WT)
+            pan_rad, tilt_rad = head_angles(head or _NO_HEAD, camera, self.X_WB().inverse() @ p_WT)
         except PlanningError as error:
             raise SkillFailure(Cause.PLANNING, str(error)) from error
         if head is None:

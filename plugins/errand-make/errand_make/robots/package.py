@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -17,22 +17,17 @@ from errand_make.robots.units import check_extent
 from executive.cli.new_command import PackageTemplates
 from executive.cli.output import console_for, progress_bar
 from plant.robots.robot_kind import robot_kinds
-from skills.api import PlanningError
-from skills.capabilities import Mount
 from skills.inputs.errors import InputError, listing
 from skills.manipulation.arm.collision import ArmScene
 from skills.manipulation.arm.kinematics import arm_model
-from skills.manipulation.arm.looking_skill import NO_HEAD, head_angles
 from skills.manipulation.arm.poses import compact_configuration
-from skills.robot import Capabilities, FloatArray
+from skills.robot import Capabilities, FloatArray, Mount
 
 _TEMPLATES: Final = PackageTemplates("robot", Path(__file__).parent / "templates")
 _BAND_M: Final = 0.05
 """Half the height band of a planar LiDAR's returns, which small tilts of the robot smear."""
-
-
-_TABLE_M, _BEFORE_TABLE_M = 0.75, 1.0
-"""Height of the table in the tests, and distance of the can on it from the robot that looks."""
+_TABLE_M, _BEFORE_TABLE_M, _IN_VIEW_RAD = 0.75, 1.0, 0.5
+"""Table's height in the tests, distance of the can on it from the robot that looks, half the camera's view."""
 
 
 def check_robot_name(name: str) -> None:
@@ -89,10 +84,8 @@ def _sees_table(can: Capabilities) -> bool:
     if camera is None or camera.mount is not Mount.BODY:
         return True
     over_m = _TABLE_M - can.standing_height_m
-    with suppress(PlanningError):
-        head_angles(NO_HEAD, camera, np.array([_BEFORE_TABLE_M, 0.0, over_m]))
-        return float(camera.X_FC.translation()[2]) > over_m
-    return False
+    x, y, z = camera.X_FC.inverse() @ np.array([_BEFORE_TABLE_M, 0.0, over_m])
+    return bool(camera.X_FC.translation()[2] > over_m and math.hypot(x, y) < math.tan(_IN_VIEW_RAD) * z)
 
 
 def _stowed(can: Capabilities, tries: Sequence[FloatArray]) -> FloatArray:

@@ -43,12 +43,8 @@ _FEEL_LAG_M, _DOWN = 0.0022, 0.8
 """The same for an empty hand that moves down at 0.05 rad/s at most, and the vertical component that counts as down."""
 _CONTACT_N, _PRESS_N = 8.0, 15.0
 """Force on a slow hand that means contact; on a free hand it is at most 6 N (measured in the plant). With an object."""
-_NEAR_X_M = 0.05
-"""Distance ahead of the carrying positions within which the hand is near the body."""
-_NEAR_Y_M = 0.3
-"""Distance to a side within which the hand is near the body."""
-_NEAR_Z_M = 0.06
-"""Height above the carrying positions within which the hand is near the body."""
+_NEAR_X_M, _NEAR_Y_M, _NEAR_Z_M = 0.05, 0.3, 0.06
+"""Distances ahead of the carrying positions, to a side and above them within which the hand is near the body."""
 WEIGHING_S = 0.3
 """Time over which weighing averages the noise of the readings."""
 FEELING_S = (0.5, 4.0)
@@ -118,10 +114,9 @@ class ArmSkill(RoutineSkill[InputsT]):
 
     def grip_by(self, watch: HoldWatch) -> Grip:
         """Judges the grip; grips the object more firmly when it starts to slip."""
-        context = self.context
-        grip = watch.judge(context.robot.gripper(), context.clock.now())
-        if grip is Grip.SLIPPING:
-            self.issue(grip_again(context.robot, watch.force_n, clock=context.clock, lease=context.lease))
+        robot, clock = self.context.robot, self.context.clock
+        if (grip := watch.judge(robot.gripper(), clock.now())) is Grip.SLIPPING:
+            self.issue(grip_again(robot, watch.force_n, clock=clock, lease=self.context.lease))
         return grip
 
     @property

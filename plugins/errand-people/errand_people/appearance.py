@@ -27,6 +27,9 @@ _HEAD_M, _HEAD_WIDTH_M = 0.20, (0.10, 0.25)
 _NARROW_M, _ASIDE_M, _NEAR_M, _BEHIND_M = 0.2, 0.16, 0.6, 0.06
 """Least width of shoulders, how far the torso's middle may be beside the head's, and the head from the expected place;
 how far its axis is behind its surface."""
+_GAP_M, _LEVEL_M, _FILLED = (0.115, 0.155), 0.17, 0.1
+"""Distances from the middle of a head at which nothing as far away is beside it, difference of what is as far, and the
+part of the head's points that may be there."""
 _HIGHER: Final = 0.4
 """Part of its height by which a blob may be farther beside its shoulders than a lower one."""
 _STANDS_M, _SITS_M = (1.57, 2.1), (0.98, 1.51)
@@ -156,6 +159,11 @@ def _head(p_W: FloatArray, place_W: FloatArray, camera_W: FloatArray) -> _Head |
             continue
         ends = np.percentile(u[crown], (3, 97))
         beside = np.abs(u - ends.mean())
+        depth = off[:, :2] @ along
+        level = np.abs(depth - np.median(depth[crown])) < _LEVEL_M
+        gap = level & (r < 0.4) & (z > -0.18) & (beside > _GAP_M[0]) & (beside < _GAP_M[1])
+        if np.count_nonzero(gap) > _FILLED * np.count_nonzero(crown):
+            continue
         shoulders = (beside < 0.36) & (r < 0.42) & (z < -0.32) & (z > -0.52)
         torso = (beside < 0.36) & (r < 0.42) & (z < -0.42) & (z > -0.7)
         if not _HEAD_WIDTH_M[0] < ends[1] - ends[0] < _HEAD_WIDTH_M[1]:
@@ -164,7 +172,7 @@ def _head(p_W: FloatArray, place_W: FloatArray, camera_W: FloatArray) -> _Head |
             continue
         wide = np.percentile(u[shoulders], (3, 97))
         aside_m = max(abs(wide.mean() - ends.mean()), abs(float(np.median(u[torso])) - ends.mean()))
-        axis_W = high[row, :2] + ends.mean() * across + (np.median(off[crown][:, :2] @ along) + _BEHIND_M) * along
+        axis_W = high[row, :2] + ends.mean() * across + (np.median(depth[crown]) + _BEHIND_M) * along
         if wide[1] - wide[0] < _NARROW_M or aside_m > _ASIDE_M or np.linalg.norm(axis_W - place_W) > _NEAR_M:
             continue
         badness = aside_m - _HIGHER * float(high[row, 2])

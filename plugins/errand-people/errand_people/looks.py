@@ -18,47 +18,11 @@ from typing import Final, TypeVar
 
 from skills.quantities import Coordinate
 
-
-class Pose(StrEnum):
-    """Pose of a person."""
-
-    STANDING = "standing"
-    SITTING = "sitting"
-    LYING = "lying"
-
-
-class Gesture(StrEnum):
-    """Gesture of a person, whose own left and right are meant; none while the arms hang."""
-
-    WAVING = "waving"
-    RAISING_LEFT_ARM = "raising_left_arm"
-    RAISING_RIGHT_ARM = "raising_right_arm"
-    POINTING_LEFT = "pointing_left"
-    POINTING_RIGHT = "pointing_right"
-    NONE = "none"
-
-
-class Colour(StrEnum):
-    """Colour of the upper clothing."""
-
-    RED = "red"
-    ORANGE = "orange"
-    YELLOW = "yellow"
-    GREEN = "green"
-    BLUE = "blue"
-    WHITE = "white"
-    GREY = "grey"
-    BLACK = "black"
-
-
-class Trait(StrEnum):
-    """Part of a person's appearance."""
-
-    POSE = "pose"
-    GESTURE = "gesture"
-    CLOTHES_COLOUR = "clothes_colour"
-
-
+Pose = StrEnum("Pose", "STANDING SITTING LYING")
+Gesture = StrEnum("Gesture", "WAVING RAISING_LEFT_ARM RAISING_RIGHT_ARM POINTING_LEFT POINTING_RIGHT NONE")
+"""Gesture of a person, whose own left and right are meant; none while the arms hang."""
+Colour = StrEnum("Colour", "RED ORANGE YELLOW GREEN BLUE WHITE GREY BLACK")
+Trait = StrEnum("Trait", "POSE GESTURE CLOTHES_COLOUR")
 TRAITS: Final = tuple(Trait)
 TraitT = TypeVar("TraitT")
 KINDS_NOTE: Final = "the kind of clothing is not told apart"

@@ -49,9 +49,11 @@ _ARM_M, _ARM_MOVES_M, _UP_M, _THIN_M = 0.95, 0.45, -0.18, 0.25
 the largest thickness of an arm that is held out."""
 _ALIKE: Final = 22.0
 """Largest difference of colours (CIE Lab, lightness less) of the same clothes."""
-_DARK, _LIGHT, _UNCLEAR, _PALE, _VIVID, _PREVAILS = 58, 172, 8, 55, 85, 0.6
-"""Limits (0 to 255) of black, of white and grey, which are unclear in between, and of vivid colours; the least share of
-a colour that prevails."""
+_DARK, _PALE, _VIVID, _PREVAILS = 58, 55, 85, 0.6
+"""Limits (0 to 255) of black, of white and grey, and of vivid colours; the least share of a colour that prevails."""
+_LIGHT, _UNCLEAR, _SKIN_V = 0.82, 0.06, 200.0
+"""Brightness of clothes between grey and white, as a fraction of a face's, and how near to it they are not clear; the
+usual brightness of a face."""
 _HUES: Final[dict[Colour, tuple[int, int]]] = {
     Colour.RED: (172, 5),
     Colour.ORANGE: (7, 18),
@@ -104,7 +106,9 @@ def appearance_of(images: Sequence[Image], X_WO: RigidTransform, place_W: FloatA
     r = np.hypot(off[:, 0], off[:, 1])
     torso = clouds[0].where((r < 0.25) & (off[:, 2] > -0.74) & (off[:, 2] < -0.42))
     gesture = _gesture(clouds, head, camera_W) if _shows_arms(images[0], X_WO, head, camera_W) else None
-    return Appearance(_upright(head.top_m), gesture, _colour(torso)), head.axis_W
+    face = clouds[0].where((r < 0.17) & (off[:, 2] > -0.25) & _is_skin(clouds[0].colours))
+    skin_v = float(np.median(_hsv(face.colours)[:, 2])) if len(face) >= _FEWEST else None
+    return Appearance(_upright(head.top_m), gesture, _colour(torso, skin_v)), head.axis_W
 
 
 def candidates(image: Image, X_WO: RigidTransform) -> list[tuple[float, float]]:
@@ -339,13 +343,16 @@ def _chest(skin: NDArray[np.bool_], along: FloatArray, low_m: float, high_m: flo
     return np.asarray((from_head > 0.3) & (from_head < 0.5))
 
 
-def _colour(cloud: PointCloud) -> Colour | None:
-    """Colour of most points of clothes; None when there are too few, or no colour prevails."""
+def _colour(cloud: PointCloud, skin_v: float | None = None) -> Colour | None:
+    """Colour of most points of clothes; None when there are too few, or no colour prevails.
+
+    `skin_v` is the brightness of the person's face (0 to 255), with which white and grey are compared.
+    """
     if len(cloud) < 4 * _FEWEST:
         return None
     h, s, v = (each.astype(int) for each in _hsv(cloud.colours).T)
     dark, pale = v < _DARK, s < _PALE
-    bright = float(np.median(v)) - _LIGHT
+    bright = float(np.median(v)) / (_SKIN_V if skin_v is None else skin_v) - _LIGHT
     votes: dict[Colour, float] = {
         Colour.BLACK: float(np.mean(dark)),
         Colour.WHITE: float(np.mean(~dark & pale)) if bright > _UNCLEAR else 0.0,

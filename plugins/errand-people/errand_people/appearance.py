@@ -210,7 +210,10 @@ def _shows_arms(image: Image, X_WO: RigidTransform, head: _Head, camera_W: Float
 
 def _gesture(clouds: Sequence[PointCloud], head: _Head, camera_W: FloatArray) -> Gesture | None:
     """Gesture of a person from several clouds, of which the first has colours; None when it is not sure."""
-    first = _arms(clouds[0], head, _clothes_and_skin(clouds[0], head))
+    own = _clothes_and_skin(clouds[0], head)
+    first = _arms(clouds[0], head, own)
+    if first is not None and not first:
+        first = _arms(clouds[0], head, own, attached=True)
     later = [_arms(cloud, head, None) for cloud in clouds[1:]]
     if first is None or any(each is None for each in later):
         return None
@@ -220,7 +223,7 @@ def _gesture(clouds: Sequence[PointCloud], head: _Head, camera_W: FloatArray) ->
         return None
     (arm,) = first
     track = [arm]
-    for arms in later:
+    for arms in later if arm[2] > _UP_M else ():
         near = [each for each in arms or () if np.linalg.norm(each - arm) < _ARM_MOVES_M]
         if not near:
             return None
@@ -237,14 +240,17 @@ def _gesture(clouds: Sequence[PointCloud], head: _Head, camera_W: FloatArray) ->
     return Gesture.POINTING_LEFT if left_m > 0 else Gesture.POINTING_RIGHT
 
 
-def _arms(cloud: PointCloud, head: _Head, own: NDArray[np.bool_] | None) -> list[FloatArray] | None:
+def _arms(
+    cloud: PointCloud, head: _Head, own: NDArray[np.bool_] | None, *, attached: bool = False
+) -> list[FloatArray] | None:
     """Middles (3,) of what is raised or held out, from the top of the head; None when something may be such an arm.
 
-    Only thin pieces that begin near the body count, and where the points of clothes and skin are known, only those.
+    Only thin pieces count, and where the points of clothes and skin are known (`own`), only those. `attached`
+    parts them from all others, such as a wall that a hand touches, and a piece must begin at the body.
     """
     off = cloud.p_W - [*head.axis_W, head.top_m]
     r = np.hypot(off[:, 0], off[:, 1])
-    near = np.flatnonzero((off[:, 2] > -0.62) & (r < _ARM_M + 0.1))
+    near = np.flatnonzero((off[:, 2] > -0.62) & (r < _ARM_M + 0.1) & (own if attached else True))
     off, r = off[near], r[near]
     cells = np.floor(off / 0.06).astype(np.int64)
     cells -= cells.min(axis=0, initial=0)
@@ -260,7 +266,9 @@ def _arms(cloud: PointCloud, head: _Head, own: NDArray[np.bool_] | None) -> list
         rows = np.flatnonzero(piece & up)
         if len(rows) < _FEWEST:
             rows = np.flatnonzero(piece & aside)
-        if len(rows) < _FEWEST or (own is not None and np.mean(own[near[rows]]) < 0.5):
+        if len(rows) < _FEWEST or (attached and not np.any(r[piece] < 0.25)):
+            continue
+        if own is not None and np.mean(own[near[rows]]) < 0.5:
             continue
         thin = np.ptp(np.percentile(off[rows, 2], (4, 96))) < _THIN_M or off[rows, 2].min() > _UP_M
         if own is None or (thin and r[rows].max() < _ARM_M):

@@ -54,8 +54,11 @@ def judge_sought(condition: GoalCondition, truth: Truth) -> tuple[bool, str]:
     right = _people_at(condition.goal, condition.source, wanted, truth, end_s)
     faced = [*_faced(condition, truth, end_s)]
     met = next((person for person in faced if person in right), None)
-    is_before = f"{condition.robot or 'the robot'} is before {met or listing(faced) or 'nobody'}"
-    return met is not None, f"{is_before}; {condition.wanted} in {where(condition.goal)}: {listing(right) or 'nobody'}."
+    is_before = f"{condition.robot or 'the robot'} is before {met or listing(faced or ['nobody'])}"
+    return (
+        met is not None,
+        f"{is_before}; {condition.wanted} in {where(condition.goal)}: {listing(right or ['nobody'])}.",
+    )
 
 
 def judge_delivered(condition: GoalCondition, truth: Truth) -> tuple[bool, str]:
@@ -63,9 +66,9 @@ def judge_delivered(condition: GoalCondition, truth: Truth) -> tuple[bool, str]:
     wanted = appearance_of(condition.wanted) or Appearance()
     right = _people_at(condition.goal, (), wanted, truth, truth.ended_s(condition))
     takers = {one.name: one.on_tray_of for one in truth.histories if one.class_name in condition.classes}
-    has = listing(f"{person} has the {name}" for name, person in takers.items() if person is not None)
-    meant = f"{condition.wanted} in {where(condition.goal)}: {listing(right) or 'nobody'}"
-    return any(person in right for person in takers.values()), f"{has or 'nobody has it'}; {meant}."
+    has = listing([f"{person} has the {name}" for name, person in takers.items() if person] or ["nobody has it"])
+    meant = f"{condition.wanted} in {where(condition.goal)}: {listing(right or ['nobody'])}"
+    return any(person in right for person in takers.values()), f"{has}; {meant}."
 
 
 def judge_reported(condition: GoalCondition, truth: Truth) -> tuple[bool, str]:
@@ -80,10 +83,10 @@ def judge_reported(condition: GoalCondition, truth: Truth) -> tuple[bool, str]:
         right = _number_in(last) == due[0]
     else:
         people = _people_at(condition.source[:1], condition.source[1:], Appearance(), truth, said_s)
-        due = tuple(_trait(name, asked.info, truth) for name in people)
+        due = tuple(dict.fromkeys(_trait(name, asked.info, truth) for name in people))
         right = any(last.endswith(f" is {each}") for each in due)
     said = f"it said {last!r} to {heard or 'nobody'}" if last else "it said nothing"
-    return right and heard is not None, f"{said}; right: {listing(due, last='or') or 'nothing'}."
+    return right and heard is not None, f"{said}; right: {listing(due or ['nothing'], last='or')}."
 
 
 def judge_replied(condition: GoalCondition, truth: Truth) -> tuple[bool, str]:
@@ -95,7 +98,7 @@ def judge_replied(condition: GoalCondition, truth: Truth) -> tuple[bool, str]:
     pairs = [each.split(SEPARATOR, 1) for each in condition.classes]
     due = [pair[1] for pair in pairs if pair[0] == asked]
     said = f"it said {last!r} to {heard or 'nobody'}, who asks {asked!r}" if last else "it said nothing"
-    return last in due, f"{said}; right: {listing(due, last='or') or 'not known'}."
+    return last in due, f"{said}; right: {listing(due or ['not known'], last='or')}."
 
 
 def _last_words(condition: GoalCondition) -> tuple[str, float]:

@@ -1,7 +1,7 @@
 """The people of a scene as a sentence needs them: where they are, what they look like, what they ask, where they walk.
 
 As the referees of the league do, people are asked to stand where a command needs them: who is described is there, who
-is to be followed sets out after `SETS_OUT_S`, and who is guided follows the robot. The seed chooses the rest.
+is to be followed sets out after `SETS_OUT_S`, or `FOUND_S` if the robot must look for them, and who is guided follows the robot. The seed chooses the rest.
 """
 
 import math
@@ -16,7 +16,7 @@ from executive.words.mission import Route
 from executive.words.outlines import distance_m, inside
 from plant.worlds.world import Spot
 
-SETS_OUT_S, WALKS_M_S, MOST_COUNTED = 90.0, 0.8, 2
+SETS_OUT_S, FOUND_S, WALKS_M_S, MOST_COUNTED = 90.0, 160.0, 0.8, 2
 STOPS = "Thank you, please stop."
 
 
@@ -98,8 +98,9 @@ class Cast:
         else:
             here = [one for one, outline in self.knowledge.rooms.items() if inside(outline, _at(rule))]
             others = [room for room in self.knowledge.rooms if room not in here]
+            sets_out_s = SETS_OUT_S if name in self.named else FOUND_S
             to = goal if goal not in (None, START) else str(self.rng.choice(others))
-            route = Route(waypoints=(to,), start=SETS_OUT_S, speed=WALKS_M_S, says=None if goal else STOPS)
+            route = Route(waypoints=(to,), start=sets_out_s, speed=WALKS_M_S, says=None if goal else STOPS)
         self.change(name, route=route)
 
     def change(self, name, **update):

@@ -1,7 +1,8 @@
 """The people of a scene as a sentence needs them: where they are, what they look like, what they ask, where they walk.
 
 As the referees of the league do, people are asked to stand where a command needs them: who is described is there, who
-is to be followed sets out after `SETS_OUT_S`, or `FOUND_S` if the robot must look for them, and who is guided follows the robot. The seed chooses the rest.
+is to be followed sets out after `SETS_OUT_S`, or `FOUND_S` if the robot must look for them, and who is guided follows
+the robot. The seed chooses the rest.
 """
 
 import math

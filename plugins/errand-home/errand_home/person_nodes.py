@@ -13,7 +13,7 @@ from errand_home.persons import appearance_of, description, plural_description
 from errand_home.topics import OWN_TOPICS, AboutPeople, about_people, answer_to, name_in, own_sentence, unknown_fact
 from errand_people.looks import Appearance, Gesture, Trait, gesture_text
 from errand_people.nodes import PlaceOf
-from executive.tree.behaviour import Explained, ExplainedLeaf
+from executive.tree.behaviour import ExplainedLeaf
 from executive.tree.board import FromBoard
 from executive.tree.context import ANSWER_TOPIC, RunContext
 from executive.tree.node import NodeSpec
@@ -82,9 +82,9 @@ class PeopleCount(Answer):
     where: str = ""
     text: str = ""
 
-    def _counted(self, nodes: Mapping[str, Explained], unseen: Sequence[str]) -> Status:
+    def _counted(self, unseen: Sequence[str]) -> Status:
         if unseen:
-            return self._not_looked(nodes, unseen)
+            return self._not_looked(unseen)
         count = len(distinct_objects(self.board.get(key, ()) for key in self.tallies.values()))
         number = "no" if not count else str(count)
         said = f"There {'is' if count == 1 else 'are'} {number} {self.one if count == 1 else self.several} {self.where}"
@@ -294,7 +294,7 @@ def _count(builder: PlanBuilder, appearance: Appearance, room: str, text: str) -
         "people count",
         f"how many {several} are {where}?",
         builder.sequence(f"look about the {room}", _go(builder, room), look, part="search"),
-        question=f"the number of {several} {where}",
+        affirmed=f"the number of {several} {where}",
         denied=f"no {several} {where}",
         looks=MappingProxyType({room: (look.path_id,)}),
         key=builder.key("answer"),

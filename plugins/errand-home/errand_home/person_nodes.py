@@ -25,9 +25,8 @@ from executive.tree.plan import PlanBuilder
 from executive.words.command import START
 from executive.words.expression import Template
 from executive.words.knowledge import ANYBODY
-from executive.words.outlines import Point, distance_m
-from skills.api import Cause, Failed, ObjectObservation
-from skills.descriptions import count_of, distinct_objects
+from skills.api import Cause, Failed
+from skills.descriptions import distinct_objects
 
 ANSWER_WITHIN_S: Final = 15.0
 """Time for a person to say their name or a question."""
@@ -37,31 +36,6 @@ _PLAIN: Final[Mapping[str, object]] = MappingProxyType(
     {"keys": MappingProxyType({}), "names": MappingProxyType({}), "options": (), "default": None, "gives": str}
 )
 """Options of a question that any text answers."""
-
-
-class NearestTo(ExplainedLeaf):
-    """Leaf that chooses, of the people under `people`, the one nearest to an outline, and writes them under `person`.
-
-    SUCCESS when anybody is there, else FAILURE with POSTCONDITION.
-    """
-
-    kind = "nearest to"
-    output_types: ClassVar = {"person": ObjectObservation}
-    people: str
-    person: str
-    outline: tuple[Point, ...]
-    where: str
-    context: RunContext
-
-    def update(self) -> Status:
-        """Chooses the nearest."""
-        people: Sequence[ObjectObservation] = self.context.board.get(self.people, ())
-        if not people:
-            return self.fail(Failed(Cause.POSTCONDITION, f"nobody is seen {self.where}"))
-        away_m = [distance_m(self.outline, one.position_W[:2]) for one in people]
-        nearest = people[away_m.index(min(away_m))]
-        self.context.board.put(self.person, nearest)
-        return self.say(f"{count_of(len(people), 'person')} seen; the nearest is {min(away_m):.1f} m away {self.where}")
 
 
 class PeopleCount(Answer):
@@ -157,8 +131,7 @@ class AboutPerson(Statement):
 
 def seek_plan(builder: PlanBuilder) -> NodeSpec:
     """Finds a described person in the room of the goal, and goes to them."""
-    goal = builder.place(str(builder.command.goal))
-    appearance = _appearance(builder)
+    goal, appearance = builder.place(str(builder.command.goal)), _appearance(builder)
     title = f"find the {description(appearance)} {where_text(builder, goal)}"
     return builder.sequence(title, *_find(builder, appearance, goal))
 
@@ -191,20 +164,18 @@ def where_text(builder: PlanBuilder, place: str) -> str:
 def _find(builder: PlanBuilder, appearance: Appearance, place: str) -> tuple[NodeSpec, ...]:
     """Goes to a place, looks for a person in its room, and goes to them.
 
-    At a surface, the robot begins where it sees the surface; anybody there is the one nearest to it.
+    At a surface, the robot begins where it sees the surface, and looks at the nearest people first.
     """
-    knowledge, met, where = builder.knowledge, builder.met_key(ANYBODY), where_text(builder, place)
-    surface, described = knowledge.surfaces.get(place), bool(appearance.traits())
-    chooses = surface is not None and not described
-    look, people = _look(builder, appearance, place, met, count=0 if chooses else 1)
+    room, met = builder.knowledge.room(place), builder.met_key(ANYBODY)
+    look = _look(builder, appearance, place, {"person": met}, count=1)
+    if place == room and not appearance.traits():  # who stands there is seen without a closer look
+        ports = {"area_W": builder.knowledge.rooms[room], "place": room, "person": ANYBODY, "count": 1}
+        ports |= builder.optional_ports("find_people", {"moves": True})
+        stands = builder.skill("find_people", ports, {"observation": met})
+        look = builder.first_of(f"find a person in the {room}", stands, look, part="anybody")
     within = builder.optional_ports("meet_person", {"within_m": WITHIN_M})
-    ports = {"person": ANYBODY, "place_W": PlaceOf(met), "place": knowledge.room(place), **within}
-    beside = builder.skill("meet_person", ports, {"person": met})
-    if surface is None or not chooses:
-        return _go(builder, place), look, beside
-    own = {"people": people, "person": met, "outline": surface.polygon, "where": where}
-    nearest = builder.node("nearest to", f"who is nearest to the {place}?", part="nearest", **own)
-    return _go(builder, place), look, nearest, beside
+    ports = {"person": ANYBODY, "place_W": PlaceOf(met), "place": room, **within}
+    return _go(builder, place), look, builder.skill("meet_person", ports, {"person": met})
 
 
 def _go(builder: PlanBuilder, place: str) -> NodeSpec:
@@ -215,17 +186,14 @@ def _go(builder: PlanBuilder, place: str) -> NodeSpec:
     return builder.or_stay(f"go to the {place}, if possible", go, "it looks from here", part="go")
 
 
-def _look(builder: PlanBuilder, appearance: Appearance, place: str, key: str, *, count: int) -> tuple[NodeSpec, str]:
-    """Search for people in the room of a place, and the key for all of them; a `count` of 0 finds everybody."""
-    room, people = builder.knowledge.room(place), builder.key("people")
-    ports: dict[str, object] = {"area_W": builder.knowledge.rooms[room], "place": room, "count": count}
+def _look(
+    builder: PlanBuilder, appearance: Appearance, place: str, outputs: Mapping[str, str], *, count: int
+) -> NodeSpec:
+    """Searches the room of a place for people of an appearance; a `count` of 0 finds everybody."""
+    room = builder.knowledge.room(place)
+    ports = {"area_W": builder.knowledge.rooms[room], "place": room, "person": f"the {description(appearance)}"}
     traits: dict[str, object] = {str(trait): value for trait, value in appearance.traits().items()}
-    if not traits:
-        ports |= {"person": ANYBODY, **builder.optional_ports("find_people", {"moves": True})}
-        return builder.skill("find_people", ports, {"observation": key, "observations": people}), people
-    outputs = {"people": people} if count == 0 else {"person": key}
-    who = {"person": f"the {description(appearance)}"}
-    return builder.skill("find_person", {**ports, **who, **traits}, outputs), people
+    return builder.skill("find_person", {**ports, "count": count, **traits}, outputs)
 
 
 def report_plan(builder: PlanBuilder) -> NodeSpec:
@@ -288,7 +256,8 @@ def _count(builder: PlanBuilder, appearance: Appearance, room: str, text: str) -
     """Counts the people of an appearance in a room, and writes the sentence under a key."""
     if room not in builder.knowledge.rooms:
         raise builder.error(f"people are counted in rooms, and '{room}' is none", "name the room")
-    look, people = _look(builder, appearance, room, builder.key("person"), count=0)
+    people = builder.key("people")
+    look = _look(builder, appearance, room, {"people": people}, count=0)
     several, where = plural_description(appearance), where_text(builder, room)
     return builder.node(
         "people count",

@@ -72,13 +72,16 @@ def people(script, registry, robot):
     def find(skill):
         asked = skill.inputs
         wanted = Appearance(asked.pose, asked.gesture, asked.clothes_colour)
-        found = [seen(x, y, room) for x, y, room, own in there.values() if room == asked.place and fits(own, wanted)]
+        here = (robot.standing.x_m, robot.standing.y_m)
+        fit = [one for one in there.values() if one[2] == asked.place and fits(one[3], wanted)]
+        found = [seen(x, y, room) for x, y, room, _ in sorted(fit, key=lambda one: math.dist(one[:2], here))]
         if not found:
             return Failed(Cause.POSTCONDITION, f"{asked.person} is not seen in the {asked.place}")
         return Succeeded("found", {"person": found[0], "people": tuple(found)})
 
     def find_people(skill):
-        found = [seen(x, y, room) for x, y, room, _ in there.values() if room == skill.inputs.place]
+        here = [one for one in there.values() if one[2] == skill.inputs.place and one[3].pose == "standing"]
+        found = [seen(x, y, room) for x, y, room, _ in here]
         if not found:
             return Failed(Cause.POSTCONDITION, f"nobody is seen in the {skill.inputs.place}")
         return Succeeded("found", {"observation": found[0], "observations": tuple(found), "unexplained": ()})
@@ -159,6 +162,7 @@ KITCHEN = {"Sam": (5.0, 1.0, "kitchen", WAVING), "Robin": (5.0, -1.0, "kitchen",
         (SEEK.format("kitchen", "person wearing blue"), (4.0, -1.0), None),
         (SEEK.format("counter", "person"), (4.0, -1.0), None),
         (SEEK.format("shelf", "person"), (4.0, 1.0), None),
+        (SEEK.format("kitchen", "person"), (4.0, 1.0), None),
         (SEEK.format("kitchen", "lying person"), None, Cause.POSTCONDITION),
         (SEEK.format("bedroom", "waving person"), None, Cause.POSTCONDITION),
     ],

@@ -2,13 +2,12 @@
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Final
-
-import numpy as np
 
 from errand_home.persons import appearance_of
 from errand_home.topics import about_people
+from errand_people.judges import faced_people
 from errand_people.looks import Appearance, Colour, Gesture, Pose, gesture_text
 from executive.words.command import START
 from executive.words.goal import GoalCondition, Region
@@ -17,16 +16,9 @@ from plant.models.person_figure import CLOTHES, Figure
 from plant.referee.findings import region_at, where
 from plant.referee.object_history import Truth
 from skills.inputs.errors import listing
-from skills.robot import FloatArray
 
-NEAR_M: Final = 2.0
-"""Greatest distance of the robot's body from the person to whom it has gone or speaks."""
-FACES_RAD: Final = 1.05
-"""Greatest bearing of that person from the robot's direction."""
 NEXT_M: Final = 0.5
 """Difference up to which two people are equally near to a place."""
-LEAST_M: Final = 0.05
-"""Distance of the hand from the body below which the hand gives no direction."""
 SEPARATOR: Final = "? "
 """Text between a known question and its answer in the classes of a condition."""
 _CLOCK: Final = re.compile(r"It is [0-2]\d:[0-5]\d")
@@ -52,7 +44,7 @@ def judge_sought(condition: GoalCondition, truth: Truth) -> tuple[bool, str]:
     """Judges whether a robot stands before a person who fits the description, in the room and nearest to the place."""
     end_s, wanted = truth.ended_s(condition), appearance_of(condition.wanted) or Appearance()
     right = _people_at(condition.goal, condition.source, wanted, truth, end_s)
-    faced = [*_faced(condition, truth, end_s)]
+    faced = [*faced_people(condition, truth, end_s)]
     met = next((person for person in faced if person in right), None)
     is_before = f"{condition.robot or 'the robot'} is before {met or listing(faced or ['nobody'])}"
     return (
@@ -92,7 +84,7 @@ def judge_reported(condition: GoalCondition, truth: Truth) -> tuple[bool, str]:
 def judge_replied(condition: GoalCondition, truth: Truth) -> tuple[bool, str]:
     """Judges whether the last words answer the question of the person before the robot."""
     last, said_s = _last_words(condition)
-    heard = next(_faced(condition, truth, said_s), None)
+    heard = next(faced_people(condition, truth, said_s), None)
     answers = truth.people[heard].answers if heard is not None and heard in truth.people else {}
     asked = next((said for part, said in answers.items() if "question" in part.lower()), "").strip("? ")
     pairs = [each.split(SEPARATOR, 1) for each in condition.classes]
@@ -114,35 +106,14 @@ def _number_in(said: str) -> str:
 def _listener(condition: GoalCondition, truth: Truth, time_s: float) -> str | None:
     """Listener at a time: without a goal whoever hears it, at the start the speaker, else a person before the robot."""
     if condition.person is None and not condition.goal:
-        return next(_faced(condition, truth, time_s), "whoever is there")
+        return next(faced_people(condition, truth, time_s), "whoever is there")
     if condition.goal and condition.goal[0].name == START:
         paths = truth.robots_of(condition).values()
         there = any(region_at(condition.goal, path.position_at(time_s)) is not None for path in paths)
         return "the speaker" if there else None
-    heard = [one for one in _faced(condition, truth, time_s) if condition.person in (None, one)]
+    heard = [one for one in faced_people(condition, truth, time_s) if condition.person in (None, one)]
     inside = (one for one in heard if region_at(condition.goal, truth.persons[one].position_at(time_s)) is not None)
     return next(iter(heard) if not condition.goal else inside, None)
-
-
-def _faced(condition: GoalCondition, truth: Truth, time_s: float) -> Iterator[str]:
-    """Yields the people near and ahead of a robot, the nearest first; its stowed hand is ahead of its body."""
-    found = list[tuple[float, str]]()
-    for robot, path in truth.robots_of(condition).items():
-        p_WB, hand = path.position_at(time_s), truth.hands.get(robot)
-        ahead_W = None if hand is None or not len(hand.positions.points) else hand.positions.position_at(time_s) - p_WB
-        for name, walked in truth.persons.items():
-            to_W = walked.position_at(time_s) - p_WB
-            if np.hypot(*to_W[:2]) <= NEAR_M and _bearing_rad(ahead_W, to_W) <= FACES_RAD:
-                found.append((float(np.hypot(*to_W[:2])), name))
-    yield from (name for _, name in sorted(found))
-
-
-def _bearing_rad(ahead_W: FloatArray | None, to_W: FloatArray) -> float:
-    """Angle between two directions in the plane; 0 for a robot without an arm."""
-    if ahead_W is None or float(np.hypot(*ahead_W[:2])) < LEAST_M:
-        return 0.0
-    turned = math.atan2(to_W[1], to_W[0]) - math.atan2(ahead_W[1], ahead_W[0])
-    return abs(math.remainder(turned, math.tau))
 
 
 def _people_at(

@@ -1,6 +1,7 @@
 """Judges of the tasks on people, by a simulation's truth."""
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -10,11 +11,18 @@ from executive.words.goal import GoalCondition, Region
 from plant.referee.findings import Finding, distance_m, judge_company, region_at, where
 from plant.referee.object_history import TimedPath, Truth
 from skills.inputs.errors import count_text
+from skills.robot import FloatArray
 
 NEAR_M: Final = 3.0
 """Greatest distance of the robot's body from the person whom it follows or guides."""
 GREETS_WITHIN_M: Final = 2.5
 """Greatest distance of the robot's body from a person whom it greets."""
+FACED_WITHIN_M: Final = 2.0
+"""Greatest distance of the robot's body from the person to whom it has gone or speaks."""
+FACES_RAD: Final = 1.05
+"""Greatest bearing of that person from the robot's direction."""
+LEAST_M: Final = 0.05
+"""Distance of the hand from the body below which the hand gives no direction."""
 LOST_M: Final = 5.0
 LONGEST_LOSS_S: Final = 10.0
 """A robot that was farther than this from the person, for longer than this, has lost the person."""
@@ -38,14 +46,40 @@ def judge_guided(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _with_person(condition: GoalCondition, truth: Truth) -> GoalCondition:
-    """Condition of the person who was nearest to a robot when the step began, where it names nobody."""
+    """Condition of the person before a robot, or next to it, when the step began, where it names nobody."""
     at_s, people, robots = condition.from_s, truth.persons_of(condition), truth.robots_of(condition).values()
     away_m = [
         (distance_m(robot.position_at(at_s), path.position_at(at_s)), name)
         for name, path in people.items()
         for robot in robots
     ]
-    return replace(condition, person=min(away_m)[1]) if away_m else condition
+    nearest = min(away_m)[1] if away_m else None
+    return replace(condition, person=next((name for name in faced_people(condition, truth, at_s)), nearest))
+
+
+def faced_people(condition: GoalCondition, truth: Truth, time_s: float) -> Iterator[str]:
+    """Yields the people near and ahead of a robot at a time, first whom it faces most.
+
+    The robot's stowed hand is ahead of its body.
+    """
+    found = list[tuple[float, float, str]]()
+    for robot, path in truth.robots_of(condition).items():
+        p_WB, hand = path.position_at(time_s), truth.hands.get(robot)
+        ahead_W = None if hand is None or not len(hand.positions.points) else hand.positions.position_at(time_s) - p_WB
+        for name, walked in truth.persons_of(condition).items():
+            to_W = walked.position_at(time_s) - p_WB
+            away_m, bearing_rad = float(np.hypot(*to_W[:2])), _bearing_rad(ahead_W, to_W)
+            if away_m <= FACED_WITHIN_M and bearing_rad <= FACES_RAD:
+                found.append((bearing_rad, away_m, name))
+    yield from (name for *_, name in sorted(found))
+
+
+def _bearing_rad(ahead_W: FloatArray | None, to_W: FloatArray) -> float:
+    """Angle between two directions in the plane; 0 for a robot without an arm."""
+    if ahead_W is None or float(np.hypot(*ahead_W[:2])) < LEAST_M:
+        return 0.0
+    turned = math.atan2(to_W[1], to_W[0]) - math.atan2(ahead_W[1], ahead_W[0])
+    return abs(math.remainder(turned, math.tau))
 
 
 def lost_s(robot: TimedPath, person: TimedPath, from_s: float, until_s: float) -> float:

@@ -54,6 +54,19 @@ class PlaceOf(FromBoard):
         return seen.position_W[0], seen.position_W[1]
 
 
+@dataclass(frozen=True)
+class PlaceIfMet(FromBoardOr):
+    """Binding of a port to the position (x, y) of the person under a blackboard key; None before anybody was met."""
+
+    gives: ClassVar[Any] = tuple[Coordinate, Coordinate] | None
+    default: Any = None
+
+    def read(self, board: Board) -> tuple[float, float] | None:
+        """Returns the position, or None."""
+        seen: ObjectObservation | None = board.get(self.key, self.default)
+        return None if seen is None else (seen.position_W[0], seen.position_W[1])
+
+
 class OnlyIfNear(OnlyIfKnown):
     """Composite that applies while the robot is near the person under `key` and saw them a short time ago, in `area_W`.
 
@@ -422,7 +435,9 @@ def _guided_area(builder: PlanBuilder, goal: str) -> tuple[tuple[float, float], 
 
 
 def _with_person(builder: PlanBuilder, person: str, title: str, skill: str, ports: dict[str, object]) -> NodeSpec:
-    if person in (SPEAKER, ANYBODY):
+    if person == ANYBODY:  # whom an earlier step has found, or who is in front of the robot
+        return builder.sequence(title, builder.skill(skill, {**ports, "place_W": PlaceIfMet(builder.met_key(ANYBODY))}))
+    if person == SPEAKER:
         return builder.sequence(title, builder.skill(skill, ports))
     work = builder.skill(skill, {**ports, "place_W": PlaceOf(builder.met_key(person))})
     return builder.sequence(title, meet_plan(builder.at("meet"), person), work)

@@ -240,6 +240,7 @@ def _found_out(builder: PlanBuilder, asked: AboutPeople, text: str) -> tuple[Nod
         room = builder.knowledge.room(asked.place)
         ports = {"person": ANYBODY, "place": room, "area_W": builder.knowledge.rooms[room], **traits}
         learn = builder.skill("read_person", ports, {asked.info: value})
+        meet = meet[:-1]  # it looks from where nothing hides the person, who may sit
     own = {"facts": Facts(), "robot": "", "key": text, "value": value, "where": where}
     names = tuple(builder.knowledge.people)
     told = builder.node("about person", f"the {asked.info}", part="told", topic=asked.info, names=names, **own)

@@ -31,6 +31,7 @@ from skills.perception.people_tracking import PeopleWatch
 from skills.quantities import Coordinate, Duration, Speed
 from skills.robot import FloatArray, Pose2D
 from skills.routine import Routine, SkillFailure
+from skills.world_model import PERSON
 
 _SURELY_M = 0.1
 """Distance inside the edge of a place beyond which a person is certainly in it."""
@@ -244,7 +245,8 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
             why = f"{self._inputs.person} could not be told apart from others for {unclear_s:.0f} s"
             raise SkillFailure(Cause.EXECUTION, why)
         in_sight = self._is_clear(np.array([(here.x_m, here.y_m), seen.place_W]))
-        if target.doubted is None or not is_addressed(seen, near, here, still=stands, in_sight=in_sight):
+        unnamed = self._inputs.person == PERSON  # nobody without a name can say that it is them
+        if target.doubted is None or unnamed or not is_addressed(seen, near, here, still=stands, in_sight=in_sight):
             return True
         if stands:
             self._halt()
@@ -270,7 +272,7 @@ class FollowPerson(ListeningSkill[FollowPersonInputs]):
         """Searches doors where a lost person was heading, then asks. Raises SkillFailure when they are not found."""
         say(self.context, "I have lost sight of you.")
         self._company.most_m_s = math.inf
-        if self._inputs.place_W is not None:  # the robot asks for the name
+        if self._inputs.place_W is not None and self._inputs.person != PERSON:  # the robot asks for the name
             target.farthest_m = math.inf
         doors, here = self.context.doors, self.context.pose
         for goal in poses_to_search(target, doors, self._inputs.until_W, self.options.doors, here, self._free):

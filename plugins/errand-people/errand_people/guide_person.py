@@ -20,6 +20,7 @@ from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.quantities import Coordinate, Delay, Length, Speed, Tries, Turn
 from skills.robot import Pose2D
 from skills.routine import ENDED_EARLY, Patience, Routine, SkillFailure
+from skills.world_model import PERSON
 
 _TRACKING: Final = PeopleOptions(period_s=1.0, track_m=6.0, hidden_s=8.0)
 _NEAR: Final = MeetPersonOptions(apart_m=(1.3, 1.6, 2.2, 2.7))
@@ -191,8 +192,8 @@ class GuidePerson(ListeningSkill[GuidePersonInputs]):
     def _make_sure(self) -> Routine[None]:
         """Asks a doubtful person for their name. Raises SkillFailure unless they say yes."""
         doubted = self._doubted or (self._target is not None and self._target.doubted is not None)
-        if self._inputs.place_W is None or not doubted:
-            return
+        if self._inputs.place_W is None or self._inputs.person == PERSON or not doubted:
+            return  # nobody without a name can say that it is them
         answer: str | None = None
         answer_s, asking = self.options.answer_s, Running(f"asking whether it is {self._who}")
         for _ in range(self.options.questions):

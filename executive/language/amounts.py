@@ -42,9 +42,8 @@ def number_of_words(words: Sequence[str]) -> int | None:
         return first
     if len(rest) > 1 or rest[0] is None:
         return None
-    if words[1] == _DOZEN:
-        return first * rest[0]
-    return first + rest[0] if first in _TENS and 0 < rest[0] < 10 else None
+    added = first + rest[0] if first in _TENS and 0 < rest[0] < 10 else None
+    return first * rest[0] if words[1] == _DOZEN else added
 
 
 def parse_number(text: str) -> float | None:

@@ -235,12 +235,8 @@ def _filled(pattern: str) -> str:
 @cache
 def _phrases(name: str) -> str:
     parts, timed = read_table("rephrasing.yaml")["parts"], task_openers() - task_openers(Part.TEXT)
-    given = {
-        "verbs": (first for first, *rest in lexicon().verbs if not rest),
-        "tasks": task_openers(),
-        "timed_tasks": timed,
-        "acts": _acts(),
-    }
+    verbs = (first for first, *rest in lexicon().verbs if not rest)
+    given = {"verbs": verbs, "tasks": task_openers(), "timed_tasks": timed, "acts": _acts()}
     if name in parts:
         said = _filled(expression(parts[name]))
     else:
@@ -268,7 +264,11 @@ def _break(match: re.Match[str]) -> str:
 
 
 def _each(match: re.Match[str]) -> str:
-    """Says an act for each of some places: "wait in each of the hall and the office"."""
+    """Says an act for each of some places, or of some kinds: "how many cups and cokes are there"."""
+    if (kinds := match.groupdict().get("kinds")) is not None:
+        return " and ".join(
+            f"how many {kind}{match['tail']}" for kind in re.split(r"(?:,? and|,) (?:how many |the |our )?", kinds)
+        )
     places = re.split(r",? and (?:(?:in|on|at|to|of) )?|, ", match["places"])
     return " and ".join(f"{match['main']} {place if ' ' in place else f'the {place}'}" for place in places)
 

@@ -368,7 +368,8 @@ class Builder:
         start = len(self.plain) if alone else max(starts, default=0)
         earlier, self.plain = self.plain[start:], self.plain[:start]
         first = not (earlier or self.plain or clause.begins or clause.then)
-        unclear = first and bool(self.steps[self.begun :])
+        own = cue.kind in ROUNDS and any(isinstance(one, Repeat) for one in self.steps[-1:])  # each has its rounds
+        unclear = first and not own and bool(self.steps[self.begun :])
         self.flush()
         scope = [*earlier, replace(clause, text=cue.before)]
         scope[0] = replace(scope[0], joint="")

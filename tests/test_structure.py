@@ -60,7 +60,7 @@ GRANTS = (
     (90, "executive/words", 3),
     (90, "executive/cli", 4),
     (90, "skills", 3),
-    (90, "plant", 8),
+    (90, "plant", 122),
 )
 """Issue, room, and the lines that the issue has added to the room."""
 GRANTED = {85: 700, 87: 643, 88: 619, 90: 200}
@@ -69,8 +69,8 @@ and networks of other tools by 88.
 
 Issue 88 was to take 450.
 """
-MODULES, ONE_IMPORTER, SAME_NAME = 431, 61, 7
-"""All modules; those that one other imports; file names that stand more than once. Three modules more by 85."""
+MODULES, ONE_IMPORTER, SAME_NAME = 432, 61, 7
+"""All modules; those that one other imports; file names that stand more than once. Three modules more by 85, one by 90."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""
 

@@ -144,7 +144,9 @@ class Watch:
 
     def wait_for(self, speed, limit_s=30.0):
         until_s = time.monotonic() + limit_s
-        while time.monotonic() < until_s and not (self.seen and self.seen[-1][2] > speed):
+        while not (self.seen and self.seen[-1][2] > speed):
+            if time.monotonic() > until_s:
+                raise TimeoutError(f"the base did not reach {speed} m/s within {limit_s:.0f} s")
             time.sleep(0.005)
 
     def still_after(self, wall_s, stamp_s):
@@ -202,7 +204,7 @@ def cancel(count):
 SENDER = """
 import sys, time
 from errand_ros2.wire.node import Place
-from errand_ros2.wire.node import open_session
+from errand_ros2.wire.session import open_session
 from errand_ros2.wire.types import ros_types
 
 with open_session(Place(port=int(sys.argv[1]))) as session:

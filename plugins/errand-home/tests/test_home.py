@@ -2,12 +2,19 @@
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform, RotationMatrix
 
 from executive.app.prepare.worlds import knowledge_of, open_world, refuse_unusable
+from plant.diagram import DiagramConfig, build_diagram
+from plant.models.person_figure import Figure
 from plant.worlds.seeding import place_objects, place_people
 
 WIDEST_M = 0.115
 """Width of an object that the gripper takes."""
+CLEAR_M = 0.03
+SHOULDER = (0.0, 0.2, 1.42)
+FINGERS = 1.1
+"""Length of an arm with its fingers, as a multiple of the length to the hand."""
 
 
 @pytest.fixture(scope="module")
@@ -38,3 +45,29 @@ def test_people_stand_at_places_that_the_seed_chooses(home):
         for seed in range(12)
     ]
     assert {name: len({each[name] for each in spots}) > 1 for name in spots[0]} == dict.fromkeys(spots[0], True)
+
+
+def arms_of(spot, gesture):
+    """Points (N, 3) of both arms and hands of a person, in the world frame."""
+    figure = Figure(spot.posture, gesture)
+    X_WP = RigidTransform(RotationMatrix.MakeZRotation(spot.yaw), [spot.x, spot.y, spot.z_m])
+    for side in (1, -1):
+        shoulder = np.array(SHOULDER) * [1, side, 1]
+        for time_s in np.arange(0.0, 1.25, 0.25):
+            arm = figure.hand(side, time_s) - shoulder
+            yield from (X_WP @ figure.X_PT @ (shoulder + share * arm) for share in np.linspace(0.0, FINGERS, 12))
+
+
+def test_no_arm_of_a_person_reaches_into_walls_or_furniture(home):
+    built = build_diagram(DiagramConfig(home.directives_path, render=False))
+    context = built.scene_graph.GetMyContextFromRoot(built.diagram.CreateDefaultContext())
+    query = built.scene_graph.get_query_output_port().Eval(context)
+    reached = [
+        (rule.name, spot.x, spot.y, gesture, query.inspector().GetName(near.id_G))
+        for rule in home.seed_rules.people
+        for spot in rule.poses
+        for gesture in (rule.gestures if spot.posture != "lying" else ())
+        for p_W in arms_of(spot, gesture)
+        for near in query.ComputeSignedDistanceToPoint(p_W, CLEAR_M)
+    ]
+    assert sorted(set(reached)) == []

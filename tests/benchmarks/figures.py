@@ -20,10 +20,9 @@ def write_figures(name, values, options, folder=FOLDER):
     `options` are those of the benchmark; those that choose seeds are stored as seeds. `name` may have a note.
     """
     words = [word for word in sys.argv[1:] if word not in ("--figures", name)]
-    module = Path(sys.argv[0]).stem if sys.argv[0].endswith(".py") else Path(sys.argv[0]).name
     chosen = {key: str(value) for key, value in options.items() if key in _SEEDS}
     data = {
-        "command": shlex.join(["python", "-m", f"tests.benchmarks.{module}", *words]),
+        "command": shlex.join(["python", *_program(Path(sys.argv[0])), *words]),
         "commit": _commit(),
         "date": datetime.now(UTC).date().isoformat(),
         "machine": f"{os.cpu_count()} cores, {platform.machine()}, {platform.system()}",
@@ -34,6 +33,13 @@ def write_figures(name, values, options, folder=FOLDER):
     file = folder / f"{name}.json"
     file.write_text(json.dumps(data, indent=1, ensure_ascii=False, default=str) + "\n", encoding="utf-8")
     return file
+
+
+def _program(path):
+    """Arguments of Python that run a benchmark: its module, or the file in a plug-in."""
+    if "plugins" in path.parts:
+        return [Path(*path.parts[path.parts.index("plugins") :]).as_posix()]
+    return ["-m", f"tests.benchmarks.{path.stem if path.suffix == '.py' else path.name}"]
 
 
 def _commit():

@@ -1,6 +1,6 @@
 """Sentences of a file, one a line: how many are understood, and with seeds, how they are carried out in `home`; JSON.
 
-    python plugins/errand-home/tests/home_gpsr.py --file SENTENCES [--seed 7001] [--runs 3] [--out FOLDER] [--jobs 1]
+    python plugins/errand-home/tests/home_gpsr.py --file SENTENCES [--seed 7001] [--runs 3] [--figures NAME]
 
 Without `--seed`, sentences are only read. With it, the first `--runs` sentences that are understood run, each in the
 scene of the next seed, for at most five simulated minutes. As the referees of the league do before a command, the scene
@@ -116,10 +116,11 @@ def arranged(world, knowledge, commands, rng, *, alone):
 def summary(results):
     every = {"all": results, **dict(sorted(by(results, "category").items()))}
     refused = Counter(f"{each.category}: {re.split('[;:]', each.reason)[0]}" for each in results if not each.understood)
+    rows = {name: figures(own) for name, own in every.items()}
     return {
-        "read": {name: f"{sum(each.understood for each in own)}/{len(own)}" for name, own in every.items()},
+        **rows["all"],
+        "categories": [["sentences", *rows["all"]], *([name, *row.values()] for name, row in rows.items())],
         "refused": dict(refused.most_common()),
-        **({"run": {name: figures(own) for name, own in every.items()}} if any(one.ran for one in results) else {}),
         "failed": [
             [each.seed, each.sentence, each.message, each.why] for each in results if each.ran and not each.fulfilled
         ],
@@ -127,16 +128,22 @@ def summary(results):
 
 
 def figures(results):
-    """Figures of the runs among some results."""
+    """Figures of some results: how many are understood, and if some ran, of their runs."""
     ran = [each for each in results if each.ran]
-    return {
-        "ran": len(ran),
-        "claimed": sum(each.claimed for each in ran),
-        "fulfilled": sum(each.fulfilled is True for each in ran),
-        "false": sum(each.false_claim for each in ran),
-        "contacts": sum(each.collisions for each in ran),
-        "time_s": round(median([each.sim_time_s for each in ran]), 1) if ran else None,
-    }
+    understood = {"understood": f"{sum(each.understood for each in results)} of {len(results)}"}
+    return (
+        understood
+        if not ran
+        else understood
+        | {
+            "ran": len(ran),
+            "claimed": sum(each.claimed for each in ran),
+            "fulfilled": sum(each.fulfilled is True for each in ran),
+            "false": sum(each.false_claim for each in ran),
+            "contacts": sum(each.collisions for each in ran),
+            "time_s": round(median([each.sim_time_s for each in ran]), 1),
+        }
+    )
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 
 from skills.api import ObjectObservation, Surface
 from skills.inputs.errors import with_article
-from skills.world_model import PERSON
+from skills.world_model import PERSON, ObjectKind
 
 SAME_WITHIN_M = 0.12
 _TALL_M = 0.06
@@ -15,7 +15,7 @@ _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight"
 
 def wanted_names(classes: Sequence[str], attributes: Sequence[str]) -> str:
     """Names the wanted objects: "red coke or red beer"."""
-    return " or ".join(" ".join((*attributes, name)) for name in classes)
+    return " or ".join(str(ObjectKind(name, tuple(attributes))) for name in classes)
 
 
 def surface_names(surfaces: Sequence[Surface]) -> str:

@@ -47,7 +47,7 @@ class ObjectKind:
     relations: tuple[Relation, ...] = ()
 
     def __str__(self) -> str:
-        return " ".join((*self.attributes, self.name, *map(str, self.relations)))
+        return " ".join((*self.attributes, self.name.replace("_", " "), *map(str, self.relations)))
 
     @property
     def plain(self) -> ObjectKind:

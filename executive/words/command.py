@@ -273,7 +273,7 @@ def _counted_text(of: ObjectKind | None, count: int) -> str:
     if of is None:
         return NOTHING
     number = {0: f"{_PLURAL} ", 1: ""}.get(count, f"{count} ")
-    plain = f"{number}{of.plain}"
+    plain = f"{number}{' '.join((*of.attributes, of.name))}"
     parses = not _has_relation(plain) and plain[-1] != "," and _parse_counted(plain) == (of.plain, count)
     return related(plain if parses else f'{number}{" ".join((*of.attributes, ""))}"{of.name}"', of.relations)
 

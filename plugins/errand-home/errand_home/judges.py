@@ -3,13 +3,13 @@
 import re
 from typing import Final
 
-from errand_home.nodes import spoken_name
 from errand_home.orders import ORDERS, order_of
 from executive.words.command import parse_object
 from executive.words.goal import GoalCondition
 from plant.referee.findings import region_at, where
 from plant.referee.object_history import Truth
 from skills.inputs.errors import listing
+from skills.world_model import ObjectKind
 
 _SAID: Final = re.compile(r".*? (?:is|are) (the .*)")
 
@@ -27,10 +27,10 @@ def judge_compared(condition: GoalCondition, truth: Truth) -> tuple[bool, str]:
     }
     ranked = sorted(keys, key=keys.__getitem__)
     due, rest = ranked[: condition.needed], where(condition.source)
-    right = f"{superlative} on {rest}: {listing(map(spoken_name, due)) or 'nothing'}"
+    right = f"{superlative} on {rest}: {listing(str(ObjectKind(name)) for name in due) or 'nothing'}"
     last = condition.said[-1] if condition.said else ""
     heard = _SAID.fullmatch(last)
-    named = {kind for kind in kinds if heard and re.search(rf"\bthe {re.escape(spoken_name(kind))}\b", heard[1])}
+    named = {kind for kind in kinds if heard and re.search(rf"\bthe {re.escape(str(ObjectKind(kind)))}\b", heard[1])}
     if not due:
         return bool(last) and not named, f"it said {last!r}; {right}."
     limit = keys[due[-1]] + order.equal

@@ -54,7 +54,7 @@ class Comparison(Answer):
         order, every = ORDERS[self.superlative], (*found, *unknown)
         lacking = [one.kind.name for one in every if order.weighs and one.kind.name not in self.weights]
         if lacking := [name for name in dict.fromkeys(lacking) if name != ANY_OBJECT]:
-            named = listing(f"the {spoken_name(name)}" for name in lacking)
+            named = listing(f"the {ObjectKind(name)}" for name in lacking)
             return self.fail(Failed(Cause.PRECONDITION, f"the weight of {named} is not known; add it to {FACTS_FILE}"))
         first = sorted(every, key=lambda one: self._key(one, order))[: self.most]
         if strange := [one for one in first if one.kind.name == ANY_OBJECT]:
@@ -67,7 +67,7 @@ class Comparison(Answer):
 
     def _say(self, first: Sequence[ObjectObservation], order: Order) -> Status:
         """Writes the sentence, and publishes it as the answer."""
-        names = listing(f"the {spoken_name(one.kind.name)}" for one in first)
+        names = listing(f"the {one.kind.plain}" for one in first)
         source = ", by the weights in my notes" if order.weighs else ""
         said = f"{self.affirmed} {'is' if len(first) == 1 else 'are'} {names}{source}" if first else self.denied
         self.answer, self.cause, self.message = bool(first), None, said
@@ -76,11 +76,6 @@ class Comparison(Answer):
         note = {"node": self.path_id, "question": self.affirmed, "answer": bool(first), "message": said}
         self.publish(ANSWER_TOPIC, note)
         return Status.SUCCESS
-
-
-def spoken_name(name: str) -> str:
-    """Name of a class as it is said."""
-    return name.replace("_", " ")
 
 
 def compare_plan(builder: PlanBuilder) -> NodeSpec:

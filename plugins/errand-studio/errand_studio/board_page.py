@@ -10,7 +10,7 @@ from nicegui import events, run, ui
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
 from errand_studio import fragments
-from errand_studio.layout import frame, refused, tool
+from errand_studio.layout import frame, head, panel, refused, tool
 from errand_studio.runs_table import PICTURES, RunRow, RunsTable, Visit, causes, chosen, first_difference, visit
 from executive.record.history import Entry
 from skills.inputs.errors import InputError
@@ -34,8 +34,8 @@ class BoardPage:
 
     async def build(self) -> None:
         """Builds the page, and reads the runs."""
-        with ui.element("section").classes("panel grow"):
-            with ui.element("div").classes("head"):
+        with panel():
+            with head():
                 self._words = ui.input(placeholder="filter: mission, world, seed, cause", on_change=self._draw)
                 self._words.props("dense outlined clearable").style("min-width:240px")
                 self._only = ui.select(["all", "failures", "successes"], value="all", on_change=self._draw)
@@ -63,7 +63,7 @@ class BoardPage:
             only=str(self._only.value),
         )
         good = sum(row.is_good for row in found)
-        self._count.text = f"{len(found)} runs, {good} good"
+        self._count.text = f"{len(found)} run{'s' * (len(found) != 1)}, {good} good"
         self._strip.content = strip_html(found, self._rows, self._mission)
         self._body.content = rows_html(found[: self._most], self._ticked, len(found) - self._most)
         self._compare.set_enabled(len(self._ticked) == 2)

@@ -34,8 +34,10 @@ def complete(text: str, line: int, column: int, knowledge: Knowledge) -> tuple[i
 
 def _context(lines: Sequence[str], line: int, before: str) -> tuple[list[str], dict[str, str], bool]:
     """Returns the keys above the cursor, the pairs beside it, and whether a value stands there."""
-    keys, indent = _outer_keys(lines, line, before)
+    keys, indent, last = _outer_keys(lines, line, before)
     siblings = _beside(lines, line, indent)
+    if keys[-1:] == ["with"]:  # the ports are those of the skill beside it
+        siblings = {**siblings, "skill": _beside(lines, *last).get("skill", "")}
     match = _LINE.match(before)
     key, rest = (match[3], match[4] if match[3] else match[5]) if match else (None, None)
     path, is_value = (keys, False) if key is None else ([*keys, key.strip()], True)
@@ -56,21 +58,23 @@ def _context(lines: Sequence[str], line: int, before: str) -> tuple[list[str], d
     return path, siblings, is_value
 
 
-def _outer_keys(lines: Sequence[str], line: int, before: str) -> tuple[list[str], int]:
-    """Returns the keys under which a line stands, by indentation, and the column of its first key."""
+def _outer_keys(lines: Sequence[str], line: int, before: str) -> tuple[list[str], int, tuple[int, int]]:
+    """Returns the keys under which a line stands, the column of its first key, and line and column of the last key."""
     match = _LINE.match(before)
     indent = len(match[1]) + len(match[2]) if match else 0
     column, keys = indent - (len(match[2]) if match and match[2] else 0), list[str]()
-    dashed = bool(match and match[2])
-    for above in reversed(lines[: line - 1]):
+    dashed, own_indent, last = bool(match and match[2]), indent, (line, indent)
+    for number in range(line - 1, 0, -1):
+        above = lines[number - 1]
         found = _LINE.match(above)
         if found is None or not above.strip() or above.lstrip().startswith("#"):
             continue
         own = len(found[1]) + len(found[2])
         if found[3] is not None and not found[4] and (own < indent or (dashed and own == column)):
+            last = last if keys else (number, own)
             keys.insert(0, found[3].strip())
             indent, column, dashed = own, len(found[1]), bool(found[2])
-    return keys, len(match[1]) + len(match[2]) if match else 0
+    return keys, own_indent, last
 
 
 def _beside(lines: Sequence[str], line: int, indent: int) -> dict[str, str]:

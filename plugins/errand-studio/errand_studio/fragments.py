@@ -14,7 +14,19 @@ from executive.app.report.run_report import VERDICTS
 from executive.tree.node_view import NodeView
 from executive.view.text import note_of, style_of
 
+DRAWING: Final = '<p class="nothing">drawing …</p>'
 _LOOKS: Final[Mapping[str, str]] = {"not run": "idle", "found nothing": "expected"}
+
+_SHAPES: Final[Mapping[str, str]] = {
+    "selector": "first of",
+    "guard": "guarded",
+    "retry": "retried",
+    "only if holding": "if holding",
+    "choose": "chosen",
+    "afterwards": "tidied",
+}
+"""Names of the shapes of plans, by the kinds of their nodes."""
+_EYES: Final = ("detect", "find people")
 
 
 def _attributes(**values: Any) -> str:
@@ -25,7 +37,7 @@ def _attributes(**values: Any) -> str:
 def outline_html(rows: Sequence[Row], marked: Mapping[int, bool], stops: Collection[int]) -> str:
     """Returns the outline. `marked` has the lines with messages (True: an error), `stops` those with breakpoints."""
     if not rows:
-        return '<p class="nothing">no steps yet: choose one in the palette</p>'
+        return '<p class="nothing">no steps yet: choose one at the left, or say a sentence</p>'
     lines = []
     for row in rows:
         found = [error for line, error in marked.items() if not row.is_list and _own_line(row, rows, line)]
@@ -84,11 +96,25 @@ def tree_html(trees: Iterable[NodeView], *, deep: int = 3) -> str:
     return f'<ul class="tree">{items}</ul>' if items else '<p class="nothing">no tree: the mission has errors</p>'
 
 
+def shape_of(node: NodeView) -> str:
+    """Returns the name of the shape of `PlanBuilder` that a node has; its kind if it has none."""
+    match node.kind, node.children:
+        case "selector", (_, NodeView(kind="pause")):
+            return "or stay"
+        case "recover", (NodeView(kind="skill", name="navigate"), *_):
+            return "navigate"
+        case "sequence", (NodeView(kind="recover"), NodeView(kind="skill") as look) if look.name.startswith(_EYES):
+            return "look from"
+        case "afterwards", (_, NodeView(kind="skill", name="stow")):
+            return "stow after"
+    return _SHAPES.get(node.kind, node.kind)
+
+
 def _node_html(node: NodeView, depth: int, deep: int) -> str:
     style = style_of(node.state)
     look = _LOOKS.get(style.word, style.word)
     line = None if node.source is None else node.source.line
-    kind, name = ("", node.label) if node.kind in ("mission", "step") else (node.kind, node.name)
+    kind, name = ("", node.label) if node.kind in ("mission", "step") else (shape_of(node), node.name)
     said = f'<span class="kind">{escape(kind)}</span>' if kind and kind != name else ""
     note = note_of(node)
     told = f'<span class="note">{escape(note)}</span>' if note else ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -31,6 +31,46 @@ def frame(title: str, here: str) -> None:
         ui.html("<b>errand studio</b>", sanitize=False)
         for name, address in (("Missions", "/"), ("Board", "/board")):
             ui.link(name, address).classes("here" if name == here else "")
+
+
+def panel(kind: str = "grow") -> ui.element:
+    """Builds a panel."""
+    return ui.element("section").classes(f"panel {kind}")
+
+
+def head(title: str = "") -> ui.element:
+    """Builds the head of a panel; what is added stands at its right, or at its left if there is no title."""
+    with ui.element("div").classes("head") as made:
+        if title:
+            ui.html(f"<h2>{title}</h2>", sanitize=False)
+            ui.element("span").classes("spring")
+    return made
+
+
+class Notice:
+    """Question above the text of a page, until it is answered."""
+
+    def __init__(self) -> None:
+        self._bar = ui.element("div").classes("notice")
+        self.hide()
+
+    @property
+    def is_shown(self) -> bool:
+        """Returns whether a question waits for its answer."""
+        return bool(self._bar.visible)
+
+    def hide(self) -> None:
+        """Takes the question back."""
+        self._bar.set_visibility(False)
+
+    def ask(self, text: str, answers: Mapping[str, Callable[[], object]]) -> None:
+        """Asks a question; each answer is a button."""
+        self._bar.clear()
+        with self._bar:
+            ui.label(text)
+            for name, act in answers.items():
+                tool(name, self.hide).on_click(act)
+        self._bar.set_visibility(True)
 
 
 def tool(text: str, on_click: Callable[..., Any] | None = None, *, hint: str = "", kind: str = "") -> ui.button:

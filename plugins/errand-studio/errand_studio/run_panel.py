@@ -9,7 +9,7 @@ from typing import Final
 from nicegui import ui
 
 from errand_studio import fragments
-from errand_studio.layout import tool
+from errand_studio.layout import head, panel, tool
 from errand_studio.running import MissionRuns, RunOptions
 from executive.app.prepare.mission_files import shipped_missions
 from plant.worlds.world import known_worlds
@@ -20,17 +20,14 @@ _LAST_LINES: Final = 30
 class RunPanel:
     """Form of a run, with the page and the last lines of the current run."""
 
-    def __init__(self, runs: MissionRuns, start: Callable[[], Awaitable[None]], back: Callable[[], None]) -> None:
-        """Builds the panel, which is hidden; `start` and `back` are called by its buttons."""
+    def __init__(self, runs: MissionRuns, start: Callable[[], Awaitable[None]]) -> None:
+        """Builds the panel, which is hidden; `start` is called by its button."""
         self._runs, self._shown_page = runs, ""
-        with ui.element("section").classes("panel grow") as self._panel:
-            with ui.element("div").classes("head"):
-                ui.html("<h2>Run</h2>", sanitize=False)
+        with panel() as self._panel:
+            with head("Run"):
                 self._state = ui.html("", sanitize=False)
-                ui.element("span").classes("spring")
                 self._start_button = tool("Start", start, kind="main")
                 self._stop_button = tool("Stop", self._stop, kind="stop", hint="Ends the run in order")
-                tool("Back to the text", back)
             with ui.element("div").classes("form"):
                 self._build_form()
             self._live = ui.html("", sanitize=False).classes("grow").style("display:flex;min-height:0")

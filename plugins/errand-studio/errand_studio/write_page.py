@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
+from functools import partial
+from pathlib import Path
 from typing import Any, Final
 
 from nicegui import events, run, ui
@@ -12,7 +14,8 @@ from nicegui import events, run, ui
 from errand_studio import fragments, outline
 from errand_studio.checking import Insight
 from errand_studio.folder import ConflictError, Opened
-from errand_studio.layout import frame, refused, tool
+from errand_studio.layout import Notice, frame, head, panel, refused, tool
+from errand_studio.mission_edits import Edited, dropped, edited, inserted, items, path_of
 from errand_studio.palette import Example, examples
 from errand_studio.run_panel import RunPanel
 from errand_studio.workshop import Workshop
@@ -26,7 +29,8 @@ PAUSE_S: Final = 0.2
 """Pause of typing after which a text is checked."""
 LOOK_S: Final = 1.0
 """Period in which drafts are kept, and files looked at; a crash loses at most so much."""
-_STEPS: Final = ("steps",)
+_FIRST: Final = "mission"
+"""Name of the file that the first step creates in an empty folder."""
 _VIEWS: Final = ("Tree", "Plan", "Commands")
 
 
@@ -47,13 +51,12 @@ class WritePage:
         """Builds the page, and opens a file."""
         frame("errand studio", "Missions")
         self._build_bar()
-        self._notice = ui.element("div").classes("notice")
+        self._notice = Notice()
         with ui.element("div").classes("work") as self._work:
             self._build_files()
             self._build_editor()
             self._build_views()
-        self._run_panel = RunPanel(self._workshop.runs, self._start, self._show_run)
-        self._notice.set_visibility(False)
+        self._run_panel = RunPanel(self._workshop.runs, self._start)
         self._draw_palette()
         ui.on("studio", self._event)
         names = self._folder.names()
@@ -62,6 +65,7 @@ class WritePage:
             self._open(first)
         else:
             self._draw_files()
+            self._outline.content = fragments.outline_html((), {}, ())
         ui.timer(LOOK_S, self._look)
         with suppress(TimeoutError):
             await ui.context.client.connected(timeout=30.0)
@@ -84,47 +88,39 @@ class WritePage:
 
     def _build_files(self) -> None:
         with ui.element("div").classes("stack"):
-            with ui.element("section").classes("panel files-panel"):
-                with ui.element("div").classes("head"):
-                    ui.html("<h2>Missions</h2>", sanitize=False)
-                    ui.element("span").classes("spring")
+            with panel("files-panel"):
+                with head("Missions"):
                     tool("New", self._ask_new, hint="Create a mission file", kind="quiet")
                 self._files = ui.html("", sanitize=False).classes("body")
-            with ui.element("section").classes("panel grow"):
-                with ui.element("div").classes("head"):
-                    ui.html("<h2>Steps</h2>", sanitize=False)
+            with panel():
+                with head("Steps"):
                     ui.label("click, or drag").classes("t")
                 self._palette = ui.html("", sanitize=False).classes("body palette")
 
     def _build_editor(self) -> None:
         with ui.element("div").classes("stack"):
-            with ui.element("section").classes("panel grow"):
-                with ui.element("div").classes("head"):
+            with panel():
+                with head():
                     self._name = ui.label("").classes("name")
                     self._dirty = ui.label("").classes("t")
-                    ui.element("span").classes("spring")
                 self._editor = ui.codemirror(on_change=self._changed, language="YAML", theme="githubLight", indent="  ")
                 self._editor.classes("editor")
-                with ui.element("div").classes("head").style("border-top:1px solid var(--edge);border-bottom:0"):
-                    self._sentence = ui.input(placeholder='Say: "bring me a beer from the kitchen"').props(
-                        "dense outlined"
-                    )
-                    self._sentence.classes("grow").on("keydown.enter", self._say)
+                with head().classes("foot"):
+                    self._sentence = ui.input(placeholder='Say: "bring me a beer from the kitchen"')
+                    self._sentence.props("dense outlined").classes("grow").on("keydown.enter", self._say)
                     tool("Add its steps", self._say, hint="The steps of the sentence, behind the cursor")
-            with ui.element("section").classes("panel").style("max-height:30%;min-height:64px"):
+            with panel("found"):
                 self._messages = ui.html("", sanitize=False).classes("body")
 
     def _build_views(self) -> None:
         with ui.element("div").classes("stack"):
-            with ui.element("section").classes("panel grow"):
-                with ui.element("div").classes("head"):
-                    ui.html("<h2>Outline</h2>", sanitize=False)
-                    ui.element("span").classes("spring")
+            with panel():
+                with head("Outline"):
                     self._build_edits()
                 self._outline = ui.html("", sanitize=False).classes("body")
-            with ui.element("section").classes("panel grow see-panel"):
-                with ui.element("div").classes("head"):
-                    self._tabs = {name: tool(name, self._choose(name)) for name in _VIEWS}
+            with panel("grow see-panel"):
+                with head():
+                    self._tabs = {name: tool(name, partial(self._choose, name)) for name in _VIEWS}
                 self._seen = ui.html("", sanitize=False).classes("body wide")
         self._tabs[self._view].classes("here")
 
@@ -141,11 +137,8 @@ class WritePage:
             tool(sign, kind="quiet", hint=hint).on("click", js_handler=f"() => {{ {send.format(what)} }}")
         with tool("Wrap", kind="quiet", hint="Put the step into a block (W)"), ui.menu() as self._wraps:
             for kind in outline.WRAPS:
-                item = ui.menu_item(kind)
-                item.on(
-                    "click",
-                    js_handler=f'() => emitEvent("studio", {{what: "wrap in", kind: "{kind}", path: studio.path}})',
-                )
+                send = f'() => emitEvent("studio", {{what: "wrap in", kind: "{kind}", path: studio.path}})'
+                ui.menu_item(kind).on("click", js_handler=send)
 
     # Files
 
@@ -159,10 +152,10 @@ class WritePage:
         self._name.text = name
         ui.run_javascript(f"history.replaceState(null, '', '/?file=' + encodeURIComponent({name!r}))")
         self._show(opened.text)
-        self._hide_notice()
+        self._notice.hide()
         if opened.draft is not None:
             draft = opened.draft
-            self._ask(
+            self._notice.ask(
                 "There is an unsaved draft of this file.", {"Take it": lambda: self._show(draft), "Drop it": self._drop}
             )
         self._draw_files()
@@ -181,9 +174,12 @@ class WritePage:
                 refused(error)
                 return
             dialog.close()
-            self._open(name)
+            typed = "" if self._file.name else self._text
+            self._leave_for(name)
+            if typed:
+                self._show(typed)
 
-        with ui.dialog(value=True) as dialog, ui.element("div").classes("panel").style("padding:14px;gap:10px"):
+        with ui.dialog(value=True) as dialog, ui.element("div").classes("panel asked"):
             asked = ui.input(placeholder="name of the file, as in night_round").props("dense outlined autofocus")
             asked.on("keydown.enter", create)
             tool("Create", create, kind="main")
@@ -192,52 +188,36 @@ class WritePage:
     def _is_dirty(self) -> bool:
         return bool(self._file.name) and self._text != self._file.text
 
-    def _save(self) -> bool:
-        """Saves the file; returns whether it is saved now."""
-        if not self._file.name:
+    def _save(self, stamp: str | None = None) -> bool:
+        """Saves the file if it still has a stamp, by default that which it had; returns whether it is saved now."""
+        name = self._file.name
+        if not name:
             self._ask_new()
             return False
         try:
-            self._store(self._file.stamp)
+            saved = self._folder.save(name, self._text, self._file.stamp if stamp is None else stamp)
         except ConflictError:
-            self._ask(
-                "The file has changed since you opened it.",
-                {"Load it": self._reload, "Overwrite it": lambda: self._store(self._folder.stamp(self._file.name))},
-            )
+            self._ask_which("The file has changed since you opened it.")
             return False
         except InputError as error:
             refused(error)
             return False
+        self._file = Opened(name, self._text, saved)
+        self._notice.hide()
+        self._draw_dirty()
         return True
 
-    def _store(self, stamp: str) -> None:
-        saved = self._folder.save(self._file.name, self._text, stamp)
-        self._file = Opened(self._file.name, self._text, saved)
-        self._hide_notice()
-        self._draw_dirty()
+    def _ask_which(self, text: str) -> None:
+        """Asks for one of two texts that differ."""
+
+        def overwrite() -> None:
+            self._save(self._folder.stamp(self._file.name))
+
+        self._notice.ask(text, {"Load it": self._reload, "Overwrite it": overwrite})
 
     def _reload(self) -> None:
         self._folder.drop_draft(self._file.name)
         self._open(self._file.name)
-
-    def _ask(self, text: str, answers: Mapping[str, Callable[[], object]]) -> None:
-        """Shows a question above the text until it is answered."""
-        self._notice.clear()
-        with self._notice:
-            ui.label(text)
-            for name, act in answers.items():
-                tool(name, self._answering(act))
-        self._notice.set_visibility(True)
-
-    def _answering(self, act: Callable[[], object]) -> Callable[[], object]:
-        def answer() -> None:
-            self._hide_notice()
-            act()
-
-        return answer
-
-    def _hide_notice(self) -> None:
-        self._notice.set_visibility(False)
 
     async def _look(self) -> None:
         """Keeps the draft, takes over what others have saved, and shows the run's lines."""
@@ -249,18 +229,15 @@ class WritePage:
             self._kept = self._version
             await run.io_bound(self._folder.keep_draft, name, self._text)
         stamp = await run.io_bound(self._folder.stamp, name)
-        if stamp == self._file.stamp or self._notice.visible or name != self._file.name:
+        if stamp == self._file.stamp or self._notice.is_shown or name != self._file.name:
             return
         if not stamp:
-            self._ask("The file is gone.", {"Write it again": lambda: self._store("")})
+            self._notice.ask("The file is gone.", {"Write it again": lambda: self._save("")})
         elif not self._is_dirty:
             self._open(name)
             ui.notify("The file has changed outside, and is loaded again.", position="top")
         else:
-            self._ask(
-                "The file has changed outside, and your text is not saved.",
-                {"Load it": self._reload, "Overwrite it": lambda: self._store(self._folder.stamp(name))},
-            )
+            self._ask_which("The file has changed outside, and your text is not saved.")
 
     # Text and check
 
@@ -333,14 +310,12 @@ class WritePage:
             self._outline.content = fragments.outline_html(outline.rows(self._text), marked, self._stops)
             ui.run_javascript("setTimeout(() => studio.redrawn(), 60)")
 
-    def _choose(self, name: str) -> Callable[[], object]:
-        async def choose() -> None:
-            self._tabs[self._view].classes(remove="here")
-            self._view = name
-            self._tabs[name].classes("here")
-            await self._draw_view()
-
-        return choose
+    async def _choose(self, name: str) -> None:
+        self._tabs[self._view].classes(remove="here")
+        self._view = name
+        self._tabs[name].classes("here")
+        self._seen.content = fragments.DRAWING
+        await self._draw_view()
 
     async def _draw_view(self) -> None:
         insight, view = self._insight, self._view
@@ -363,7 +338,7 @@ class WritePage:
     async def _event(self, event: events.GenericEventArguments) -> None:
         """Handles what a user does in a panel."""
         values: Mapping[str, Any] = event.args if isinstance(event.args, dict) else {}
-        what, path = str(values.get("what")), _path(values.get("path"))
+        what, path = str(values.get("what")), path_of(values.get("path"))
         try:
             if what == "theme":
                 self._editor.theme = "githubDark" if values.get("dark") else "githubLight"
@@ -380,11 +355,15 @@ class WritePage:
                 self._draw_outline()
                 self._decorate()
             elif what == "pick":
-                self._insert_behind(path, self._examples[int(values["number"])].text)
+                self._insert(path, [self._examples[int(values["number"])].text])
             elif what == "drop":
-                self._dropped(values)
+                step = self._examples[int(values["pick"])].text if "pick" in values else ""
+                to = path_of(values["to"]) or ()
+                self._take(dropped(self._text, to, values["place"], None if step else path, step))
+            elif what == "wrap":
+                self._wraps.open()
             elif path is not None:
-                self._edit(what, path, str(values.get("kind")))
+                self._take(edited(what, self._text, path, str(values.get("kind"))))
         except InputError as error:
             refused(error)
         except (KeyError, IndexError, ValueError, TypeError):
@@ -403,50 +382,15 @@ class WritePage:
         lines[message.line - 1] = lines[message.line - 1].replace(word, meant, 1)
         self._show("\n".join(lines))
 
-    def _edit(self, what: str, path: KeyPath, kind: str) -> None:
-        text, index, own = self._text, int(path[-1]), path[:-1]
-        if what == "remove":
-            self._edited(outline.remove(text, path), None)
-        elif what == "double":
-            self._edited(outline.double(text, path), (*own, index + 1))
-        elif what == "wrap":
-            self._wraps.open()
-        elif what == "wrap in":
-            self._edited(outline.wrap(text, path, kind), path)
-        elif what == "up" and index > 0:
-            self._edited(outline.move(text, path, own, index - 1), (*own, index - 1))
-        elif what == "down":
-            self._edited(outline.move(text, path, own, index + 1), (*own, index + 1))
-        elif what == "out" and len(own) > 1:
-            above = next(path[:n] for n in range(len(own) - 1, 0, -1) if isinstance(path[n - 1], int))
-            self._edited(outline.move(text, path, above[:-1], int(above[-1]) + 1), (*above[:-1], int(above[-1]) + 1))
-        elif what == "in" and index > 0:
-            within = [each for each in outline.list_paths(text) if each[: len(path)] == (*own, index - 1)]
-            if within:
-                self._edited(outline.move(text, path, within[-1], 1_000), None)
+    def _insert(self, path: KeyPath | None, steps: list[str]) -> None:
+        """Inserts steps behind the step at `path`, or at the end; without an open file, creates one."""
+        if not self._file.name and not self._text.strip():
+            self._open(self._folder.create(_FIRST))
+        self._take(inserted(self._text, path, steps, Path(self._file.name or _FIRST).stem.replace("_", " ")))
 
-    def _dropped(self, values: Mapping[str, Any]) -> None:
-        to, place, path = _path(values["to"]) or (), values["place"], _path(values.get("path"))
-        target, index = (to, 0) if place == "into" else (to[:-1], int(to[-1]) + (place == "behind"))
-        if "pick" in values:
-            step = self._examples[int(values["pick"])].text
-            self._edited(outline.insert(self._text, target, index, step), (*target, index))
-        elif path is not None:
-            index -= target == path[:-1] and index > int(path[-1])
-            self._edited(outline.move(self._text, path, target, index), None)
-
-    def _insert_behind(self, path: KeyPath | None, *steps: str) -> None:
-        """Inserts steps behind the step at `path`, or at the end of the mission."""
-        text, number = self._text, 0
-        if not text.strip():
-            text = f"name: {self._file.name.removesuffix('.yaml').replace('_', ' ')}\nsteps: []\n"
-        target, index = (_STEPS, 10_000) if path is None else (path[:-1], int(path[-1]) + 1)
-        for number, step in enumerate(steps):
-            text = outline.insert(text, target, index + number, step)
-        self._edited(text, None if path is None else (*target, index + number))
-
-    def _edited(self, text: str, path: KeyPath | None) -> None:
+    def _take(self, result: Edited) -> None:
         """Shows an edited text, and selects a step."""
+        text, path = result
         self._show(text)
         row = next((row for row in outline.rows(text) if row.path == path), None) if path else None
         if row is not None:
@@ -463,9 +407,8 @@ class WritePage:
             ui.notify(meaning.reason if meaning else "not understood", type="warning", position="top", multi_line=True)
             return
         path = await ui.run_javascript("studio.path", timeout=5.0)
-        steps = _items(steps_to_yaml(meaning.all_steps))
         try:
-            self._insert_behind(_path(path), *steps)
+            self._insert(path_of(path), items(steps_to_yaml(meaning.all_steps)))
         except InputError as error:
             refused(error)
             return
@@ -497,20 +440,3 @@ class WritePage:
         nodes = [node for tree in trees for _, node in tree.walk() if node.step and node.source is not None]
         lines = {node.source.line: node.path_id for node in reversed(nodes) if node.source is not None}
         return [lines[line] for line in sorted(self._stops) if line in lines]
-
-
-def _path(value: Any) -> KeyPath | None:
-    """Reads a path that a browser sends."""
-    if not isinstance(value, list) or not all(isinstance(each, str | int) for each in value):
-        return None
-    return tuple(value)
-
-
-def _items(lines: tuple[str, ...]) -> list[str]:
-    """Splits the lines of steps into the steps."""
-    found = list[list[str]]()
-    for line in lines:
-        if line.startswith("- "):
-            found.append([])
-        found[-1].append(line)
-    return ["\n".join(each) for each in found]

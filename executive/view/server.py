@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import json
 import math
+import os
 import re
 import secrets
 import socket
@@ -45,8 +46,8 @@ _GOING_AWAY: Final = 1001
 _NOT_ALLOWED: Final = 4403
 
 
-_FRAMES: Final = "frame-ancestors http://127.0.0.1:* http://localhost:*"
-"""Policy that lets only pages of this machine show the page in a frame."""
+_FRAMES: Final = f"frame-ancestors {os.environ.get('ERRAND_VIEW_FRAMES', '')}"
+"""Policy that lets only the origins that the environment names, separated by blanks, show the page in a frame."""
 _SCENE: Final = f"sandbox allow-scripts; default-src 'unsafe-inline' data: blob:; {_FRAMES} http://"
 """Policy of the scene, without the host: it has an origin, and in Chromium a process, of its own, and no server."""
 _TUNNEL: Final = "ssh -L {port}:127.0.0.1:{port} USER@HOST"
@@ -144,8 +145,7 @@ class PageServer(Server):
 
     def _allowed(self, connection: HTTPConnection) -> bool:
         """Trusts a connection if host (an address or a name of this machine, any port), origin and token are right."""
-        headers = connection.headers
-        here = headers.get("host", "")
+        headers, here = connection.headers, connection.headers.get("host", "")
         given = headers.get(TOKEN_HEADER) or connection.query_params.get("token")
         given = given or connection.path_params.get("token", "")
         own = self._own.fullmatch(here) is not None and headers.get("origin") in (None, f"http://{here}")

@@ -60,6 +60,7 @@ def serve(workshop: Workshop, port: int, tell: Callable[[str], None]) -> None:
     except OSError as error:
         what = f"cannot serve the page at port {port} ({error.strerror})"
         raise InputError(what, hint="name another --view-port") from error
+    workshop.runs.origins = " ".join(f"http://{host}:{opened.getsockname()[1]}" for host in (HOST, "localhost"))
     token = secrets.token_urlsafe(24)
     register(workshop)
     site = FastAPI(openapi_url=None, lifespan=None)

@@ -27,7 +27,8 @@ class Guard:
     """ASGI application that lets requests with the token through to another one.
 
     The first request has the token in its address; its answer moves the token to a cookie. A request with another host
-    than this machine's loopback, or from another origin, is refused, and so is a body of over `MOST_BODY` bytes.
+    than this machine's loopback, or from another origin, is refused, and so is a body of unknown length or
+    of over `MOST_BODY` bytes.
     """
 
     def __init__(self, app: ASGIApp, token: str) -> None:
@@ -41,7 +42,9 @@ class Guard:
         connection = HTTPConnection(scope)
         if not self._is_own(connection):
             await self._refuse(scope, receive, send, HTTPStatus.FORBIDDEN, _MISSING)
-        elif int(connection.headers.get("content-length") or 0) > MOST_BODY:
+        elif (
+            "transfer-encoding" in connection.headers or int(connection.headers.get("content-length") or 0) > MOST_BODY
+        ):
             await self._refuse(scope, receive, send, HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "The body is too large.")
         elif self._has(connection.query_params.get("token")) and scope["type"] == "http":
             answer = RedirectResponse(scope["path"])

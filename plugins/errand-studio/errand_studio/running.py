@@ -107,6 +107,8 @@ class MissionRuns:
     def __init__(self, out: Path, live_port: int = 0) -> None:
         self.out, self._live_port = out, live_port
         self.current: Running | None = None
+        self.origins = ""
+        """Origins of the studio, which may show the live page in a frame."""
         self._tasks = set[asyncio.Task[None]]()
 
     async def start(self, file: Path, options: RunOptions, stops: Sequence[str] = ()) -> Running:
@@ -123,6 +125,7 @@ class MissionRuns:
             stderr=asyncio.subprocess.STDOUT,
             limit=_MOST_LINE,
             cwd=file.parent,
+            env={**os.environ, "ERRAND_VIEW_FRAMES": self.origins},
             start_new_session=True,
         )
         self.current = Running(file.name, process)

@@ -392,6 +392,7 @@ class WritePage:
         """Shows an edited text, and selects a step."""
         text, path = result
         self._show(text)
+        self._draw_outline()
         row = next((row for row in outline.rows(text) if row.path == path), None) if path else None
         if row is not None:
             ui.run_javascript(f"studio.focus({list(row.path)!r}); setTimeout(() => studio.goTo({row.line}), 80)")

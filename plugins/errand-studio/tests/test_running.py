@@ -7,7 +7,6 @@ import pytest
 from studio_user import play
 
 from errand_studio.running import MissionRuns, RunOptions
-from skills.inputs.errors import InputError
 
 
 @pytest.mark.parametrize(
@@ -38,30 +37,5 @@ def test_a_mission_that_is_refused_says_why(tmp_path: Path) -> None:
             await asyncio.sleep(0.05)
         assert "a.yaml:3" in running.lines[-1]
         assert not running.goes_on
-
-    play(scenario)
-
-
-@pytest.mark.mission
-def test_a_run_has_a_live_page_breakpoints_and_an_end(tmp_path: Path) -> None:
-    (tmp_path / "a.yaml").write_text("name: a\nsteps:\n  - speak: One.\n  - speak: Two.\n")
-
-    async def scenario() -> None:
-        runs = MissionRuns(tmp_path / "out")
-        running = await runs.start(tmp_path / "a.yaml", RunOptions(), ["alice/a/2-speak/speak"])
-        while not running.page:
-            await asyncio.sleep(0.05)
-        with pytest.raises(InputError, match="runs already"):
-            await runs.start(tmp_path / "a.yaml", RunOptions())
-        while not any("One." in line for line in running.lines):
-            await asyncio.sleep(0.05)
-        running.stop()
-        while running.goes_on:
-            await asyncio.sleep(0.05)
-        await runs.close()
-        assert running.is_over
-        assert running.note == ""
-        assert running.result is not None
-        assert [said["text"] for said in running.result["said"]] == ["One."]
 
     play(scenario)

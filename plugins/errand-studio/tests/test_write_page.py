@@ -101,14 +101,6 @@ def test_a_sentence_becomes_its_steps(with_page: Callable[[Scenario], None]) -> 
     with_page(scenario)
 
 
-def test_a_change_outside_is_loaded_where_nothing_is_unsaved(with_page: Callable[[Scenario], None], file: Path) -> None:
-    async def scenario(page: StudioUser) -> None:
-        file.write_text(TEXT + "  - to: office\n")
-        await page.until(lambda: "office" in page.editor.value)
-
-    with_page(scenario)
-
-
 def test_a_change_outside_never_overwrites_unsaved_text(with_page: Callable[[Scenario], None], file: Path) -> None:
     async def scenario(page: StudioUser) -> None:
         page.type(TEXT + "  - to: bedroom\n")
@@ -118,20 +110,6 @@ def test_a_change_outside_never_overwrites_unsaved_text(with_page: Callable[[Sce
         assert file.read_text().endswith("office\n")
         page.press("Overwrite it")
         await page.until(lambda: file.read_text().endswith("bedroom\n"))
-
-    with_page(scenario)
-
-
-def test_a_draft_is_offered_again(with_page: Callable[[Scenario], None], file: Path) -> None:
-    file.with_name(".round.draft.yaml").write_text(TEXT + "  - to: office\n")
-
-    async def scenario(page: StudioUser) -> None:
-        await page.see("unsaved draft")
-        page.press("Take it")
-        await page.until(lambda: page.editor.value.endswith("office\n"))
-        await page.send("save")
-        assert file.read_text().endswith("office\n")
-        assert not file.with_name(".round.draft.yaml").exists()
 
     with_page(scenario)
 

@@ -1,7 +1,7 @@
 "use strict";
 // Clicks, keys and drags of the studio's panels become events for the server; a selected line is marked in all panels.
 (() => {
-  const studio = (window.studio = { line: 1, path: null, editor: null });
+  const studio = (window.studio = { line: 1, path: null, editor: null, edits: 0 });
   const send = (what, more = {}) => emitEvent("studio", { what, line: studio.line, path: studio.path, ...more });
   const all = (selector, within = document) => [...within.querySelectorAll(selector)];
   const rows = () => all(".outline li");
@@ -117,6 +117,8 @@
     const what = keys[event.key];
     if (!what || (event.key.startsWith("Arrow") && !event.altKey)) return;
     event.preventDefault();
+    if (Date.now() < studio.edits) return; // the outline is as it was before the last edit
+    studio.edits = Date.now() + 1000;
     studio.focused = on.dataset.path;
     send(what === "break" ? "stop line" : what, { path: pathOf(on), at: +on.dataset.line });
   });
@@ -150,6 +152,7 @@
   });
   document.addEventListener("dragend", () => { clear(); dragged = null; });
   studio.redrawn = () => { // after the server has drawn the outline again
+    studio.edits = 0;
     studio.mark();
     const first = document.querySelector(".outline li.chosen") || rows()[0];
     if (first) first.tabIndex = 0;

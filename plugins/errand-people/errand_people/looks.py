@@ -12,7 +12,7 @@ take their positions as they take those of named people.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final, TypeVar
 
@@ -81,8 +81,13 @@ class LookedAt:
     stamp_s: float
 
     def merged(self, later: "LookedAt") -> "LookedAt":
-        """Adds a later look; a trait on which the looks differ is unsure again."""
+        """Adds a later look; a trait on which the looks differ is unsure again.
+
+        Only a sure lying pose implies that there is no gesture.
+        """
         a, b = self.appearance, later.appearance
+        if _agreed(a.pose, b.pose) is None:
+            a, b = (replace(one, gesture=None) if one.pose is Pose.LYING else one for one in (a, b))
         colour: Colour | None = _agreed(a.clothes_colour, b.clothes_colour)
         both = Appearance(_agreed(a.pose, b.pose), _agreed(a.gesture, b.gesture), colour)
         return LookedAt(both, later.place_W, later.stamp_s)

@@ -26,6 +26,7 @@ def test_an_appearance_is_told_in_words(appearance, text):
     [
         (SITS, Appearance(None, Gesture.WAVING), Appearance(Pose.SITTING, Gesture.WAVING)),
         (SITS, STANDS, Appearance(None, Gesture.WAVING)),
+        (SITS, Appearance(Pose.LYING, Gesture.NONE), Appearance()),
         (SITS, SITS, SITS),
     ],
 )

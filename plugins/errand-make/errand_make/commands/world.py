@@ -261,10 +261,13 @@ def show(
 
 @world.command("check")
 def check_world(folder: Annotated[str, typer.Argument(metavar="WORLD", help="A world by name or folder.")]) -> None:
-    """Checks the files of a world: maps, models, knowledge, names, and that each person stands free."""
+    """Checks the files of a world: maps, models, knowledge, names, and that people and places are free."""
+    from errand_make.worlds.additions import refuse_blocked_places
+
     checked = open_world(folder)
     _warn_of_names(folder)
     refuse_unusable(checked)
+    refuse_blocked_places(checked)
     typer.echo(f"{folder}: can be used")
 
 

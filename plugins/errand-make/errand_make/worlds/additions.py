@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
 from errand_make.worlds import furnish
-from errand_make.worlds.rooms import BANDS_M, body_margin_m, clearance_m
+from errand_make.worlds.rooms import BANDS_M, body_margin_m, clearance_m, grid_of
 from errand_make.worlds.site import Site, restored
 from errand_make.worlds.wanted import Addition, Wanted
 from executive.app.prepare.worlds import knowledge_of, open_world, refuse_unusable
 from plant.models.catalogue import load_catalogue, read_imported
-from plant.worlds.world import WorldError
+from plant.worlds.world import World, WorldError
+from skills.grid_map import load_grid_map
 from skills.inputs.errors import InputError, listing, nearest_name, suggestion
 from skills.inputs.yaml_source import read_yaml
 from skills.robot import Pose2D
@@ -139,11 +140,30 @@ def _add_place(site: Site, wanted: Wanted) -> str:
     file.write_text(furnish.with_entry(file, "places", wanted.name, {"pose": pose}), encoding="utf-8")
     x, y, yaw = wanted.at
     knowledge_of(open_world(str(site.folder)))
-    if body_margin_m(grid := site.grid(), clearance_m(grid), Pose2D(x, y, yaw)) <= 0.0:
-        what = f"places.{wanted.name}: at ({x:g}, {y:g}, {yaw:g}) the robot's body stands in an obstacle"
-        hint = "give a free pose; `errand world show` draws the world"
-        raise read_yaml(file).error(("places", wanted.name), what, hint)
+    refuse_blocked_places(open_world(str(site.folder)), [wanted.name])
     return f"{wanted.name} at ({x:.2f}, {y:.2f}, {yaw:.2f})"
+
+
+def refuse_blocked_places(world: World, names: Collection[str] | None = None) -> None:
+    """Raises InputError for the first place, or the first of `names`, where the robot's body has no space on the map.
+
+    People who stand at a pose of their own take space, too.
+    """
+    if not world.keepout_map_path.is_file():
+        return
+    facts, source = knowledge_of(world), read_yaml(world.knowledge_path)
+    grid, hint = grid_of(load_grid_map(world.keepout_map_path)), "give a free pose; `errand world show` draws the world"
+    stands = {rule.name: rule.stands for rule in world.seed_rules.people if rule.route is None}
+    people = [(name, Pose2D(spot.x, spot.y, spot.yaw)) for name, spots in stands.items() for spot in spots]
+    bodies = [(name, furnish.Furniture(furnish.PERSON, name, furnish.PERSON_SIZE, at)) for name, at in people]
+    grids = [(f"touches {name}", furnish.with_furniture(grid, each, BANDS_M["keepout"])) for name, each in bodies]
+    tried = [(what, each, clearance_m(each)) for what, each in (("stands in an obstacle", grid), *grids)]
+    for place in facts.places if names is None else names:
+        pose = facts.place_pose(place).pose_2d()
+        at = f"places.{place}: at ({pose.x_m:g}, {pose.y_m:g}, {pose.yaw_rad:g}) the robot's body"
+        blocked = next((what for what, each, clear in tried if body_margin_m(each, clear, pose) <= 0.0), None)
+        if blocked is not None:
+            raise source.error(("places", place), f"{at} {blocked}", hint)
 
 
 _ADDED: Final[Mapping[Addition, Callable[[Site, Wanted], str]]] = {

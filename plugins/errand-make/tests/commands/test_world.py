@@ -206,6 +206,22 @@ def test_a_world_in_which_people_overlap_is_drawn_and_refused(own, tmp_path):
     assert (tmp_path / "own.png").is_file()
 
 
+def test_the_check_of_a_world_refuses_places_that_furniture_or_a_person_blocks(own_table):
+    file = own_table / "knowledge.yaml"
+    before, (surface,) = file.read_text(), load_knowledge(file).surfaces.values()
+    view = surface.viewpoints[0]
+    x, y = 0.65 * surface.polygon[0][0] + 0.35 * view.x, 0.65 * surface.polygon[0][1] + 0.35 * view.y
+    file.write_text(with_entry(file, "places", "pump", {"pose": {"x": x, "y": y, "yaw": view.yaw}}))
+    assert "the robot's body stands in an obstacle" in refusal("world", "check", own_table)
+    file.write_text(before)
+    done("world", "check", own_table)
+    pose = load_knowledge(file).place_pose("room 2")
+    people = own_table / "objects.yaml"
+    kim = f"people:\n  - {{name: Kim, pose: {{x: {pose.x}, y: {pose.y}, yaw: 0.0}}}}\n"
+    people.write_text(people.read_text().replace("people:\n", kim))
+    assert "places.room 2" in (said := refusal("world", "check", own_table)) and "touches Kim" in said
+
+
 def zone(*words):
     return errand("world", "zone", *words)
 

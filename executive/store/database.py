@@ -180,7 +180,7 @@ class Database:
                 f"SELECT * FROM {table} WHERE sum IS NOT {self._checksum_of(table)}"
             ).fetchone()
             if changed is not None:
-                raise kind.damage_error(self.path, f"its {table} of mission {changed[0]} has changed by itself")
+                raise kind.damage_error(self.path, f"in its table {table}, mission {changed[0]} has changed by itself")
 
     def _checksum_of(self, table: str) -> str:
         """Returns the SQL expression for the checksum of a row."""

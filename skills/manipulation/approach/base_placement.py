@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -114,12 +114,16 @@ def _cost(pose: Pose2D, here: Pose2D, off_m: float) -> float:
     return drive_m + 0.3 * turn + 4.0 * off_m
 
 
-def go_to_one(skill: RoutineSkill[Any], goals: Sequence[NavigateInputs]) -> Routine[None]:
-    """Drives to the first of the goals to which a path exists. Raises SkillFailure when no goal is reached."""
-    *first, last = goals
+def go_to_one(skill: RoutineSkill[Any], goals: Sequence[NavigateInputs], **changes: float) -> Routine[None]:
+    """Drives to the first of the goals to which a path exists. Raises SkillFailure when no goal is reached.
+
+    `changes` are options of the drive that differ from the stack's.
+    """
+    drive = Navigate(skill.context)
+    options, (*first, last) = replace(drive.options, **changes), goals
     for goal in first:
         with PlanningAttempt():
-            yield from skill.perform(Navigate(skill.context), goal)
+            yield from skill.perform(Navigate(skill.context, options), goal)
             return
         yield Running("choosing another place to stand")
-    yield from skill.perform(Navigate(skill.context), last)
+    yield from skill.perform(Navigate(skill.context, options), last)

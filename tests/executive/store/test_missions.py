@@ -202,7 +202,7 @@ def test_a_flipped_bit_in_a_text_is_found_and_its_mission_named(path, text, name
     assert text in content
     path.write_bytes(content.replace(text, bytes([text[0] ^ 1]) + text[1:]))
     with pytest.raises(
-        InputError, match=rf"the store is damaged \(its {named} of mission {number} has changed by itself"
+        InputError, match=rf"the store is damaged \(in its table {named}, mission {number} has changed by itself"
     ):
         MissionStore(path, create=False)
 

@@ -114,13 +114,17 @@ def _cost(pose: Pose2D, here: Pose2D, off_m: float) -> float:
     return drive_m + 0.3 * turn + 4.0 * off_m
 
 
-def go_to_one(skill: RoutineSkill[Any], goals: Sequence[NavigateInputs], **changes: float) -> Routine[None]:
+def go_to_one(
+    skill: RoutineSkill[Any], goals: Sequence[NavigateInputs], person_patience_s: float | None = None
+) -> Routine[None]:
     """Drives to the first of the goals to which a path exists. Raises SkillFailure when no goal is reached.
 
-    `changes` are options of the drive that differ from the stack's.
+    `person_patience_s` replaces the drive's option.
     """
-    drive = Navigate(skill.context)
-    options, (*first, last) = replace(drive.options, **changes), goals
+    *first, last = goals
+    options = Navigate(skill.context).options
+    if person_patience_s is not None:
+        options = replace(options, person_patience_s=person_patience_s)
     for goal in first:
         with PlanningAttempt():
             yield from skill.perform(Navigate(skill.context, options), goal)

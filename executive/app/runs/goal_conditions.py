@@ -11,6 +11,7 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.plan import StepPart
 from executive.words.expression import Expression, Template
 from executive.words.goal import GoalCondition, GoalKind, RefereeReport, When
+from executive.words.task import Part, task_named
 from skills.inputs.errors import listing
 
 SHOWN_CHARS = 60
@@ -175,12 +176,17 @@ def _moves(share: Share) -> Iterator[_Move]:
         if goal is None:
             if part.skill is None or part.skill.gripper_after is None:
                 continue
-        elif goal.kind not in _MOVING or goal.when is When.ALWAYS:
+        elif goal.when is When.ALWAYS or not (goal.kind in _MOVING or _is_carrying(goal)):
             continue
         classes = frozenset(() if goal is None else goal.classes)
         for one in share.result.executions:
             if one.path_id == _node_of(part):
                 yield _Move(classes, one.began_s, _end(one))
+
+
+def _is_carrying(goal: GoalCondition) -> bool:
+    """Returns whether the task of a plug-in takes an object along."""
+    return bool(goal.task) and task_named(goal.task).item_is is not Part.NOTHING
 
 
 def _end(one: Execution) -> float:

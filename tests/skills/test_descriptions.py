@@ -15,6 +15,7 @@ def seen(name, surface="bench", *attributes):
         ([seen("hammer")], "there is one hammer on the bench"),
         ([seen("coke"), seen("beer"), seen("coke")], "there are two cokes and one beer on the bench"),
         ([seen("wrench", "bench", "red")] * 2, "there are two red wrenches on the bench"),
+        ([seen("toy_car"), seen("toy_car")], "there are two toy cars on the bench"),
         ([seen("cube"), seen("cube", "floor")], "there are two cubes on the bench and the floor"),
     ],
 )

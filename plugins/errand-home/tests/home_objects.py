@@ -1,19 +1,24 @@
 """How many household objects the robot recognises on the surfaces of `home`, among each other; prints JSON.
 
-    python plugins/errand-home/tests/home_objects.py [--scenes 2] [--seed 1]
+    python plugins/errand-home/tests/home_objects.py [--scenes 2] [--seed 1] [--strangers 0]
 
 The seed places all objects, as it does in a run. From the first viewpoint of each surface, an arm that moves as it is
 told looks for everything, through a camera with the plant's noise. `wrong` are claimed objects that do not stand there.
+With `--strangers`, so many objects of the plant's own classes, which no model describes, stand among them.
 """
 
 import math
 import time
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from executive.app.prepare.worlds import knowledge_of, open_world
 from plant.worlds.seeding import place_objects
+from plant.worlds.world import ObjectRule
 from skills.detect.skill import Detect, DetectInputs
 from skills.detection import NoDetector
 from skills.perception.model_matching import ModelDetector
@@ -23,6 +28,8 @@ from tests.benchmarks.flat_scene import FlatScene
 from tests.benchmarks.harness import command, share, tell
 
 NEAR_M = 0.05
+KINDS = ("beer", "coke", "hammer", "screwdriver", "wrench", "cylinder", "cube")
+"""Classes of the plant whose objects stand among the household's."""
 
 
 class HomeStage(FlatScene):
@@ -44,14 +51,29 @@ def look(stage, detector, knowledge, name, placed, seed):
         run = bench.run(Detect, DetectInputs(tuple(knowledge.things), (facts.surface(name),), count=0))
         for each in run.outputs.get("observations", ()) if run.outcome == "success" else ():
             found[each.kind.name] = each
-    there = {each.class_name: each.X_WO.translation() for each in placed if each.surface == name}
+    there = {
+        each.class_name: each.X_WO.translation()
+        for each in placed
+        if each.surface == name and each.class_name not in KINDS
+    }
     near = {kind for kind in found if kind in there and math.dist(found[kind].position_W[:2], there[kind][:2]) < NEAR_M}
     return there, near, {*found} - near
 
 
-def measure(scenes: int = 2, seed: int = 1):
+def with_strangers(world, number, rng):
+    """World with objects of other kinds on its surfaces."""
+    names, tops = [*KINDS], [*world.seed_rules.fronts]
+    rules = tuple(
+        ObjectRule(name=f"stranger {k}", model=names[k % len(names)], surfaces=tuple(map(str, rng.permutation(tops))))
+        for k in range(number)
+    )
+    objects = (*world.seed_rules.objects, *rules)
+    return replace(world, seed_rules=world.seed_rules.model_copy(update={"objects": objects}))
+
+
+def measure(scenes: int = 2, seed: int = 1, strangers: int = 0):
     """Looks at all surfaces with objects."""
-    world = open_world("home")
+    world = with_strangers(open_world("home"), strangers, np.random.default_rng([seed, 4]))
     knowledge = knowledge_of(world)
     detector = ModelDetector(NoDetector(), [read_model(each.folder) for each in world.imports.values()])
     asked, right, wrong = Counter[str](), Counter[str](), Counter[str]()

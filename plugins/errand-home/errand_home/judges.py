@@ -8,8 +8,8 @@ from executive.words.command import parse_object
 from executive.words.goal import GoalCondition
 from plant.referee.findings import region_at, where
 from plant.referee.object_history import Truth
+from skills.api import ObjectKind
 from skills.inputs.errors import listing
-from skills.world_model import ObjectKind
 
 _SAID: Final = re.compile(r".*? (?:is|are) (the .*)")
 

@@ -78,8 +78,7 @@ class WritePage:
     # Building
 
     def _build_bar(self) -> None:
-        bar = next(each for each in ui.context.client.elements.values() if each.tag == "header")
-        with bar:
+        with next(each for each in ui.context.client.elements.values() if each.tag == "header"):
             ui.element("span").classes("spring")
             self._state = ui.html("", sanitize=False)
             self._run_button = tool("Run", self._show_run, hint="Set up a run, and watch it (Ctrl-Enter)")

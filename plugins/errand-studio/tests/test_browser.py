@@ -108,6 +108,7 @@ def test_a_mission_is_made_in_an_empty_folder_by_mouse_alone(page: Any, address:
     steps.nth(0).drag_to(steps.nth(7))
     page.wait_for_function("() => document.querySelectorAll('.outline li')[0].textContent.includes('speak')")
     page.get_by_role("button", name="Save").click()
+    page.get_by_text("not saved", exact=True).wait_for(state="hidden")
     page.wait_for_function("() => document.querySelector('.pill')?.textContent.startsWith('checked')")
     assert (
         file.with_name("mission.yaml")
@@ -234,6 +235,7 @@ def test_a_draft_is_offered_when_the_page_is_opened_again(page: Any, file: Path)
     page.wait_for_selector(".outline li:nth-child(3)")
     page.locator(".outline li.step").nth(2).click()
     page.reload()
+    page.wait_for_function(_READY)
     page.get_by_role("button", name="Take it").click()
     wait_for_text(page, OFFICE)
     assert file.read_text() == TEXT

@@ -155,38 +155,35 @@ def _timed(
     when = condition.when
     if when is When.END_OF_MISSION and (let_go or (condition.kind is GoalKind.WENT and drove)):
         when = When.END_OF_STEP
-    taken_s = tuple((move.from_s, move.until_s) for move in later)
-    spoken = [said for said in result.said if not said.asked and one.began_s <= said.t_s < ended_s]
-    spoken = spoken if condition.kind is GoalKind.OWN else []
+    said = result.said if condition.kind is GoalKind.OWN else ()
+    spoken = [each for each in said if not each.asked and one.began_s <= each.t_s < ended_s]
     return replace(
         condition,
         when=when,
         began_s=one.began_s,
         ended_s=one.ended_s,
-        spoken_s=tuple(said.t_s for said in spoken),
-        said=tuple(said.text for said in spoken),
-        taken_s=taken_s,
+        spoken_s=tuple(each.t_s for each in spoken),
+        said=tuple(each.text for each in spoken),
+        taken_s=tuple((move.from_s, move.until_s) for move in later),
     )
 
 
 def _moves(share: Share) -> Iterator[_Move]:
     """Yields the intervals in which a robot moved objects as its task, also in steps that failed or were stopped."""
     for part in share.tree.parts:
-        goal = part.goal
-        if goal is None:
-            if part.skill is None or part.skill.gripper_after is None:
-                continue
-        elif goal.when is When.ALWAYS or not (goal.kind in _MOVING or _is_carrying(goal)):
+        if not _is_moving(part.skill.gripper_after if part.skill else None, part.goal):
             continue
-        classes = frozenset(() if goal is None else goal.classes)
+        classes = frozenset(() if part.goal is None else part.goal.classes)
         for one in share.result.executions:
             if one.path_id == _node_of(part):
                 yield _Move(classes, one.began_s, _end(one))
 
 
-def _is_carrying(goal: GoalCondition) -> bool:
-    """Returns whether the task of a plug-in takes an object along."""
-    return bool(goal.task) and task_named(goal.task).item_is is not Part.NOTHING
+def _is_moving(gripper_after: object, goal: GoalCondition | None) -> bool:
+    """Returns whether a step moves objects: as its goal, as the task of a plug-in, or without a goal by its skill."""
+    if goal is None or goal.when is When.ALWAYS:
+        return goal is None and gripper_after is not None
+    return goal.kind in _MOVING or (bool(goal.task) and task_named(goal.task).item_is is not Part.NOTHING)
 
 
 def _end(one: Execution) -> float:

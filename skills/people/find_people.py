@@ -70,10 +70,6 @@ _BESIDE_PERSON_M = 1.0
 """Distance from a detected person within which a detector may miss another."""
 _BODY_M = 0.45
 """Distance from a body's axis within which an obstacle is that body."""
-_HALF_M = 0.25
-"""Half the width of a body."""
-_PERSON_PATIENCE_S = 5.0
-"""Time for which the robot waits for people who stand before a viewpoint."""
 _CLOSE_M = 2.5
 """Distance to which the robot approaches positions where depth may be missing because they are far."""
 _BESIDE_M = 0.5
@@ -155,7 +151,7 @@ class FindPeople(MovingSkill[FindPeopleInputs]):
             if 0 < inputs.count <= len(found) or not view.gap(moves=True) or not (goals := view.goals()):
                 break
             try:
-                yield from go_to_one(self, goals, person_patience_s=_PERSON_PATIENCE_S)
+                yield from go_to_one(self, goals)
             except SkillFailure as failure:
                 if failure.cause in (Cause.ERROR, Cause.PRECONDITION):
                     raise
@@ -314,7 +310,7 @@ class _View:
         self._missed, self._around, self.fault = self._views > 0, self._views > 0, ""
         self._unlocated, self._new = list[_Unlocated](), list[_Unlocated]()
         self._pictures, self._X_WO = list[Image](), RigidTransform()
-        self._unsure, self._doubts, self._behind = False, list[SeenPerson](), self._missed
+        self._unsure, self._doubts = False, list[SeenPerson]()
 
     def gap(self, *, moves: bool) -> str:
         """Why there may be people whom the search missed; empty when it missed nobody."""
@@ -324,20 +320,8 @@ class _View:
             return f"but {self.fault}"
         if self._doubts:
             return f"but what stands at {place_text(self._doubts[0].place_W)} may be a person"
-        sought = self._sought()
-        if not moves or not sought.any():
-            return ""
-        is_behind = not (sought & ~self._behind).any()
-        hidden = f"and {sought.sum() / self._count:.0%} of it was never in view"
-        return "but somebody may stand behind another" if is_behind else hidden
-
-    def _sought(self) -> NDArray[np.bool_]:
-        """Mask of the hidden positions to bring into view: all, or those behind people when few others are hidden."""
-        hidden, most = self._hidden(), self._options.hidden
-        if hidden.sum() > most * self._count:
-            return hidden
-        behind = hidden & self._behind
-        return np.asarray(behind & (behind.sum() > most * self._behind.sum()))
+        hidden = float(self._hidden().sum()) / self._count
+        return f"and {hidden:.0%} of it was never in view" if moves and hidden > self._options.hidden else ""
 
     def look(self, images: Sequence[Image] | None, X_WO: RigidTransform, faults: Sequence[str] = ()) -> None:
         """Marks the positions that images show from the robot's present pose; all in line of sight without cameras."""
@@ -394,23 +378,10 @@ class _View:
         self._unlocated, self._new = [one for one in (*left, *self._new) if not one.is_among(people, same_m)], []
         for one in self._unlocated:
             self._views[one.at] = 0
-        self._behind = np.any([self._behind, *map(self._shadow, people)], axis=0)
-
-    def _shadow(self, one: SeenPerson) -> NDArray[np.bool_]:
-        """Mask of the positions that a person hides from the robot's present pose."""
-        here, at_W = self._context.pose(), np.array(one.place_W)
-        here_W = np.array((here.x_m, here.y_m))
-        away_m = max(float(np.linalg.norm(at_W - here_W)), _HALF_M)
-        rays, ahead = self._points - here_W, (at_W - here_W) / away_m
-        aside_m = np.abs(rays @ (-ahead[1], ahead[0])) * away_m / np.maximum(rays @ ahead, away_m)
-        most_m = _HALF_M * (1.0 - 0.5 * away_m / np.maximum(rays @ ahead, away_m))  # three quarters of a body
-        is_behind = (rays @ ahead > away_m + _BODY_M) & (aside_m < most_m)
-        return np.asarray(is_behind & line_of_sight(self._context.costmap, at_W, self._points, beyond_m=_BODY_M))
 
     def goals(self) -> list[NavigateInputs]:
         """Free viewpoints, sorted by the number of unsure bodies or hidden positions that they bring into view."""
-        here, sought = self._context.pose(), self._sought()
-        hidden = self._points[sought if sought.any() else self._hidden()]
+        here, hidden = self._context.pose(), self._points[self._hidden()]
         reach_m = _CLOSE_M if self._unlocated else self._options.reach_m
         shown = np.array([self._shows(point, hidden, reach_m) for point in self._points], bool)
         if self._doubts:

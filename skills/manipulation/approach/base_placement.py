@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -114,20 +114,12 @@ def _cost(pose: Pose2D, here: Pose2D, off_m: float) -> float:
     return drive_m + 0.3 * turn + 4.0 * off_m
 
 
-def go_to_one(
-    skill: RoutineSkill[Any], goals: Sequence[NavigateInputs], person_patience_s: float | None = None
-) -> Routine[None]:
-    """Drives to the first of the goals to which a path exists. Raises SkillFailure when no goal is reached.
-
-    `person_patience_s` replaces the drive's option.
-    """
+def go_to_one(skill: RoutineSkill[Any], goals: Sequence[NavigateInputs]) -> Routine[None]:
+    """Drives to the first of the goals to which a path exists. Raises SkillFailure when no goal is reached."""
     *first, last = goals
-    options = Navigate(skill.context).options
-    if person_patience_s is not None:
-        options = replace(options, person_patience_s=person_patience_s)
     for goal in first:
         with PlanningAttempt():
-            yield from skill.perform(Navigate(skill.context, options), goal)
+            yield from skill.perform(Navigate(skill.context), goal)
             return
         yield Running("choosing another place to stand")
-    yield from skill.perform(Navigate(skill.context, options), last)
+    yield from skill.perform(Navigate(skill.context), last)

@@ -56,16 +56,20 @@ _HEIGHTS_M = (0.1, 0.5, 0.9, 1.3, 1.7)
 _NEAREST_M = 0.05
 """Least distance of what a picture shows."""
 _VISIBLE = 0.65
-"""Least length of a person's box, as a fraction of that of a whole person."""
+"""Least length of a person in a picture, as a fraction of that of a whole person."""
 _AXIS_ASIDE = 0.2
 """Largest distance of a person's axis from the box, as a fraction of its length."""
 _VIEWS = 3
 """Number of looks that must show a position if a camera has a fault, because a single one may miss somebody.
 
-As many pictures that show a body whole, and no person there, show that it is no person.
+As many pictures that show a body with its top, and no person there, show that it is no person, if it is low.
 """
-_WHOLE_M = (1.8, 3.5)
-"""Distances from which a picture shows a body whole and with depth."""
+_WHOLE_M = (1.8, 4.5)
+"""Distances from which a picture may show a body with its top, and with depth."""
+_TALL_M = 1.3
+"""Height above which a body may be a person though a detector recognises none: it misses some."""
+_STEP_M = 0.2
+"""Distance between the positions at which the least such distance is sought; also the tolerance of a viewpoint."""
 _BESIDE_PERSON_M = 1.0
 """Distance from a detected person within which a detector may miss another."""
 _BODY_M = 0.45
@@ -349,30 +353,39 @@ class _View:
         return self._views < np.where(self._missed, _VIEWS, 1)
 
     def note_missed(self, one: SeenPerson, shown: Sequence[tuple[float, float]]) -> SeenPerson:
-        """Counts a miss when a picture of the last look shows a body whole, and no person there or beside it."""
+        """Counts a miss when a picture of the last look shows a body with its top, and no person there or beside it."""
         here = self._context.pose()
         if any(math.dist(one.place_W, each) < _BESIDE_PERSON_M for each in shown):
             return one  # two people side by side may be one detection
         whole = [image for image in self._pictures if image.stamp_s > one.picture_s]
         place_W, here_W = np.array([one.place_W]), np.array([(here.x_m, here.y_m)])
-        whole = [image for image in whole if _may_show(image, self._X_WO, place_W, least=_VISIBLE)[0]]
+        whole = [image for image in whole if _may_show(image, self._X_WO, place_W, whole=True)[0]]
         return replace(one, missed=one.missed + 1) if whole and self._shows_body(here_W, one)[0] else one
 
-    def _shows_body(self, points_W: FloatArray, one: SeenPerson) -> NDArray[np.bool_]:
-        """Mask (N,) of the positions (N, 2) from which a picture may show a body whole."""
+    def _shows_body(self, points_W: FloatArray, one: SeenPerson, least_m: float = 0.0) -> NDArray[np.bool_]:
+        """Mask (N,) of the positions (N, 2) at least `least_m` away from which a picture may show a body whole."""
         away_m = np.linalg.norm(points_W - one.place_W, axis=1)
         is_clear = line_of_sight(self._context.costmap, np.array(one.place_W), points_W, beyond_m=_BODY_M)
-        return np.asarray((_WHOLE_M[0] <= away_m) & (away_m <= _WHOLE_M[1]) & is_clear)
+        return np.asarray((least_m <= away_m) & (away_m <= _WHOLE_M[1]) & is_clear)
+
+    def _whole_from_m(self) -> float:
+        """Least distance from which a camera of the last look shows a body whole; `_WHOLE_M[0]` if none ever does."""
+        here, away_m, shown = self._context.pose(), np.arange(*_WHOLE_M, _STEP_M), np.zeros(0, bool)
+        for image in self._pictures:
+            ahead = camera_pose_W(image, self._X_WO).rotation().matrix()[:2, 2]
+            ahead_W = (here.x_m, here.y_m) + np.outer(away_m, ahead / max(float(np.linalg.norm(ahead)), _NEAREST_M))
+            shown = np.logical_or(shown if len(shown) else False, _may_show(image, self._X_WO, ahead_W, whole=True))
+        return float(away_m[shown.argmax()] + _STEP_M) if shown.any() else _WHOLE_M[0]
 
     def end_round(self, people: Sequence[SeenPerson], unsure: Sequence[SeenPerson]) -> None:
         """Marks as hidden where people without depth may be, unless they are located by now or a later round looked.
 
         `unsure` are those in the area whom only scans or a single picture show. One of them whom a picture or two scans
-        show may be a person, unless `_VIEWS` pictures show that it is none.
+        show may be a person, unless it is low and `_VIEWS` pictures show that it is none.
         """
         self._unsure = bool(unsure)
         seen = (one for one in unsure if one.looks > 0 or one.scans > 1)
-        self._doubts = [one for one in seen if one.missed < _VIEWS and self._pictures]
+        self._doubts = [one for one in seen if (one.missed < _VIEWS or one.top_m > _TALL_M) and self._pictures]
         hidden, same_m = self._options.hidden, self._options.same_m
         left = [one for one in self._unlocated if (one.at & self._hidden()).sum() > hidden * one.at.sum()]
         self._unlocated, self._new = [one for one in (*left, *self._new) if not one.is_among(people, same_m)], []
@@ -385,8 +398,8 @@ class _View:
         reach_m = _CLOSE_M if self._unlocated else self._options.reach_m
         shown = np.array([self._shows(point, hidden, reach_m) for point in self._points], bool)
         if self._doubts:
-            hidden = np.array([one.place_W for one in self._doubts])
-            shown = np.array([self._shows_body(self._points, one) for one in self._doubts], bool).T
+            hidden, least_m = np.array([one.place_W for one in self._doubts]), self._whole_from_m()
+            shown = np.array([self._shows_body(self._points, one, least_m) for one in self._doubts], bool).T
         gains = shown.sum(axis=1)
         drives_m = np.linalg.norm(self._points - (here.x_m, here.y_m), axis=1)
         best = (n for n in np.lexsort((drives_m, -gains)) if gains[n] > 0)
@@ -412,11 +425,12 @@ def _may_show(
     X_WO: RigidTransform,
     points_W: FloatArray,
     box: tuple[float, float, float, float] | None = None,
-    least: float = 0.0,
+    *,
+    whole: bool = False,
 ) -> NDArray[np.bool_]:
     """Mask (N,) of the positions (N, 2) where a picture shows a standing person; with a box, one of its size in it.
 
-    `least`: fraction of the person's length that is in the picture.
+    With `whole`, the top of the person is in the picture, and most of the length.
     """
     lens, X_CW = image.intrinsics, camera_pose_W(image, X_WO).inverse()
     p_C = np.stack([X_CW.multiply(np.insert(points_W, 2, z_m, axis=1).T).T for z_m in _HEIGHTS_M])
@@ -426,5 +440,7 @@ def _may_show(
     long_px = max(u1 - u0, v1 - v0)
     edge_px = _AXIS_ASIDE * long_px if box else 0.0
     inside = (u > u0 - edge_px) & (u < u1 + edge_px) & (v > v0 - edge_px) & (v < v1 + edge_px)
-    in_view = (whole_px >= least * np.hypot(np.ptp(u, axis=0), np.ptp(v, axis=0))) & (long_px > _VISIBLE * whole_px)
-    return np.asarray((inside & (p_C[..., 2] > _NEAREST_M)).any(axis=0) & in_view)
+    inside &= p_C[..., 2] > _NEAREST_M
+    if whole:
+        return np.asarray(inside[-1] & (whole_px >= _VISIBLE * np.hypot(np.ptp(u, axis=0), np.ptp(v, axis=0))))
+    return np.asarray(inside.any(axis=0) & (long_px > _VISIBLE * whole_px))

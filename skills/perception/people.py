@@ -57,8 +57,8 @@ class SeenPerson:
 
     `here_W` is the robot's pose at that time. `looks` counts the pictures that showed the person, the last one at
     `picture_s`; `missed` counts later pictures that should have. A tracker sets `track`, a number above 0, the velocity
-    (m/s), the number of `scans` that showed the person, and how far the person has `moved_m` since the first of these
-    scans.
+    (m/s), the number of `scans` that showed the person, the height `top_m` up to which they did, and how far the person
+    has `moved_m` since the first of them.
     """
 
     place_W: tuple[float, float]
@@ -72,6 +72,7 @@ class SeenPerson:
     track: int = 0
     velocity_W: tuple[float, float] = (0.0, 0.0)
     scans: int = 0
+    top_m: float = 0.0
     moved_m: float = 0.0
 
     @property
@@ -191,7 +192,8 @@ def _person(stamp_s: float, X_WB: RigidTransform, points_B: FloatArray) -> SeenP
     centre = points_B[:, :2].mean(axis=0)
     behind = centre + _FRONT_TO_AXIS_M * centre / max(float(np.linalg.norm(centre)), 1e-6)
     x, y, _ = (float(value) for value in X_WB @ np.array([*behind, 0.0]))
-    return SeenPerson((x, y), _AXIS_SIGMA_M**2 * np.eye(2), 1.0, stamp_s, Pose2D.from_transform(X_WB))
+    covariance, here_W, top_m = _AXIS_SIGMA_M**2 * np.eye(2), Pose2D.from_transform(X_WB), float(points_B[:, 2].max())
+    return SeenPerson((x, y), covariance, 1.0, stamp_s, here_W, top_m=top_m)
 
 
 def pictures_with_depth(

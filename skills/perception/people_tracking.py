@@ -168,6 +168,7 @@ def _corrected(track: _Track, one: SeenPerson, by_scan: bool) -> _Track:
         track=before.track,
         velocity_W=(vx, vy),
         scans=before.scans + int(by_scan),
+        top_m=max(before.top_m, one.top_m),
         moved_m=max(before.moved_m, math.dist((x, y), track.begun_W)),
     )
     return replace(track, seen=seen, state=state, covariance=covariance)

@@ -123,11 +123,23 @@ def test_the_people_found_so_far_are_given_where_another_may_stand(monkeypatch):
     assert len(step.outputs["observations"]) == 1
 
 
-def test_pictures_that_show_a_body_whole_and_nobody_there_show_that_it_is_no_person(monkeypatch):
-    monkeypatch.setattr(find_people, "_VISIBLE", 0.2)  # at 2 m the bench's cameras show a quarter of a person
-    bench = lit_bench(monkeypatch, person_at(3.7, 2.0))
+@pytest.mark.parametrize(
+    ("tall_m", "top_m", "says"),
+    [
+        (1.2, 0.5, "nobody is seen in the room from here"),  # low, and its top is in the pictures
+        (1.2, 1.7, "nobody is seen in the room from here, but what stands at (3."),  # a head would be above them
+        (1.7, 0.5, "nobody is seen in the room from here, but what stands at (3."),  # the detector may miss a person
+    ],
+)
+def test_only_pictures_that_show_the_top_of_a_low_body_show_that_it_is_no_person(tall_m, top_m, says, monkeypatch):
+    # at 2 m the bench's cameras show a quarter of a person: `top_m` is the height that they must show
+    monkeypatch.setattr(find_people, "_VISIBLE", 0.2)
+    monkeypatch.setattr(find_people, "_HEIGHTS_M", (0.1, 0.3, top_m))
+    body = person_at(3.7, 2.0)
+    bench = lit_bench(monkeypatch, Box(body.x0, body.y0, body.x1, body.y1, 0.0, tall_m))
     step = ended(bench, PeopleDetector(bench, []), moves=True)
-    assert (step.cause, step.message) == (Cause.POSTCONDITION, "nobody is seen in the room from here")
+    assert step.message.startswith(says)
+    assert step.cause is (Cause.EXECUTION if "but" in says else Cause.POSTCONDITION)
 
 
 @pytest.mark.parametrize(("apart_m", "behind_m"), [(0.5, 0.0), (0.4, 0.0), (0.4, 0.2)])

@@ -55,15 +55,15 @@ GRANTS = (
     (88, "executive/testing", 5),
     (88, "executive/app", 111),
     (88, "executive/cli", 80),
-    (88, "skills", 243),
+    (88, "skills", 254),
     (88, "plant", 33),
     (90, "executive/words", 3),
     (90, "executive/cli", 4),
     (90, "skills", 3),
-    (90, "plant", 122),
+    (90, "plant", 125),
 )
 """Issue, room, and the lines that the issue has added to the room."""
-GRANTED = {85: 700, 87: 643, 88: 619, 90: 200}
+GRANTED = {85: 700, 87: 643, 88: 630, 90: 200}
 """Lines that an issue adds to all rooms together at most; `BASE` is without what has left, such as people by 87,
 and networks of other tools by 88.
 

@@ -4,17 +4,21 @@ The trunk frame T has the axes of a standing person: z to the head, x ahead, the
 trunk keep their places in it; only the legs differ.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 from pydantic import Field
-from pydrake.math import RigidTransform, RollPitchYaw
 
 from executive.words.knowledge import Pose
 from skills.robot import FloatArray, quantities
+
+if TYPE_CHECKING:
+    from pydrake.math import RigidTransform
 
 Posture = Literal["standing", "sitting", "lying"]
 Gesture = Literal["none", "waving", "raising_left_arm", "raising_right_arm", "pointing_left", "pointing_right"]
@@ -67,6 +71,8 @@ class Figure:
     @property
     def X_PT(self) -> RigidTransform:
         """Pose of the trunk frame in the person's: the origin is on the floor or bed, or `SEAT_M` below the seat."""
+        from pydrake.math import RigidTransform, RollPitchYaw
+
         if self.posture == "lying":
             return RigidTransform(RollPitchYaw(0.0, -math.pi / 2, 0.0), np.array([HIP_M, 0.0, LIES_ABOVE_M]))
         down_m = HIP_M - SEAT_M - SITS_ABOVE_M if self.posture == "sitting" else 0.0

@@ -25,7 +25,7 @@ _CLOCK: Final = re.compile(r"It is [0-2]\d:[0-5]\d")
 
 
 def true_appearance(person: str, truth: Truth) -> Appearance:
-    """What a person looks like: the colour is that of the dye nearest to the clothes."""
+    """Returns the true appearance of a person; the colour is that of the dye nearest to the clothes."""
     placement = truth.people.get(person)
     figure = (None if placement is None else placement.figure) or Figure()
     pose, gesture, worn = Pose(figure.posture), Gesture(figure.gesture), figure.clothes
@@ -104,9 +104,9 @@ def _number_in(said: str) -> str:
 
 
 def _listener(condition: GoalCondition, truth: Truth, time_s: float) -> str | None:
-    """Listener at a time: without a goal whoever hears it, at the start the speaker, else a person before the robot."""
+    """Listener at a time: without a goal anybody near, at the start the speaker, else a person before the robot."""
     if condition.person is None and not condition.goal:
-        return next(faced_people(condition, truth, time_s), "whoever is there")
+        return next(faced_people(condition, truth, time_s), "anybody who is there")
     if condition.goal and condition.goal[0].name == START:
         paths = truth.robots_of(condition).values()
         there = any(region_at(condition.goal, path.position_at(time_s)) is not None for path in paths)

@@ -1,4 +1,4 @@
-"""What a command of *report* and *answer* is about: topics of the robot itself, and what is asked of people."""
+"""Topics of commands of *report* and *answer*: topics of the robot itself, and what is asked of people."""
 
 import re
 from collections.abc import Sequence

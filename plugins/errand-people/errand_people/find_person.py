@@ -18,7 +18,7 @@ from skills.manipulation.approach.base_placement import go_to_one
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.surroundings import NavigateInputs
 from skills.perception.people_tracking import PeopleWatch
-from skills.quantities import Coordinate, Length, Tries, Turn
+from skills.quantities import Angle, Coordinate, Length, Tries
 from skills.robot import Pose2D
 from skills.routine import Routine, SkillFailure
 from skills.world_model import PERSON
@@ -57,7 +57,7 @@ class FindPersonOptions:
 
     viewpoints: Tries = 3
     apart_m: Length = 2.0
-    turns_rad: tuple[Turn, ...] = (0.0, 0.95, -0.95, 1.9, -1.9)
+    turns_rad: tuple[Angle, ...] = (0.0, 0.95, -0.95, 1.9, -1.9)
 
 
 class FindPerson(PeopleLookingSkill[FindPersonInputs]):

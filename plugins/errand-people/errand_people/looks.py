@@ -31,7 +31,7 @@ KINDS_NOTE: Final = "the kind of clothing is not told apart"
 
 @dataclass(frozen=True)
 class Appearance:
-    """What a person looks like. Each None is a trait that was not asked for, or that a look left unsure."""
+    """Appearance of a person. Each None is a trait that was not asked for, or that a look left unsure."""
 
     pose: Pose | None = None
     gesture: Gesture | None = None

@@ -60,7 +60,7 @@ def test_looks_that_do_not_agree_are_an_honest_failure():
     assert done.step.message.startswith("the pose and gesture of Kim is not sure")
 
 
-def test_what_is_known_is_told_beside_what_is_not_sure():
+def test_an_answer_tells_what_is_known_beside_what_is_not_sure():
     done = read([POSES, POSES, POSES])
     assert done.step.message == "the gesture of Kim is not sure; Kim is sitting"
     assert done.step.outputs["pose"] == "sitting"

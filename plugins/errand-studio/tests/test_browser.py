@@ -15,7 +15,7 @@ import pytest
 from websockets.exceptions import InvalidHandshake
 from websockets.sync.client import connect
 
-from tests.browser import browser, only_tab, tab  # noqa: F401 - fixtures
+pytest_plugins = ["tests.browser"]
 
 TEXT = "name: round\n# the round\nsteps:\n  - to: hall  # first\n  - to: kitchen\n"
 OFFICE, BEDROOM = TEXT + "  - to: office\n", TEXT + "  - to: bedroom\n"
@@ -60,7 +60,7 @@ def file(folder: Path, request: pytest.FixtureRequest) -> Path:
 
 
 @pytest.fixture
-def page(tab: Any, address: str, file: Path) -> Any:  # noqa: F811
+def page(tab: Any, address: str, file: Path) -> Any:
     return opened(tab, address)
 
 
@@ -142,10 +142,12 @@ def test_keys_edit_the_outline_and_undo_takes_it_back(page: Any) -> None:
     page.keyboard.press("Alt+ArrowDown")
     wait_for_text(page, "name: round\n# the round\nsteps:\n  - to: kitchen\n  - to: hall  # first\n")
     wait_for_chosen(page, "hall", 5)
+    page.locator(".outline li.chosen").click()
     page.keyboard.press("Alt+ArrowUp")
     wait_for_text(page, TEXT)
     wait_for_chosen(page, "hall", 4)
     page.wait_for_timeout(600)  # CodeMirror undoes edits within half a second together
+    page.locator(".outline li.chosen").click()
     page.keyboard.press("d")
     wait_for_text(page, TEXT.replace("  - to: hall  # first\n", "  - to: hall  # first\n" * 2))
     page.locator(".cm-content").click()
@@ -190,7 +192,7 @@ def test_a_file_that_is_gone_is_written_again(page: Any, file: Path) -> None:
 
 def test_two_browsers_see_each_others_saves_and_overwrite_none(
     page: Any,
-    browser: Any,  # noqa: F811
+    browser: Any,
     address: str,
     file: Path,
 ) -> None:

@@ -6,6 +6,8 @@ import yaml
 from tests.project import project_skills, skill_tests
 
 NEVER_FAILS = ("clear_costmap", "locate_dock")
+NEEDS_FIGURES = ("find_person", "read_person")
+"""Scripted scenes have no figures of people: these skills succeed in the plant alone (test_looking_mission.py)."""
 
 
 @pytest.mark.parametrize("name", sorted(project_skills()))
@@ -13,5 +15,6 @@ def test_every_skill_has_skill_tests_with_the_suite(name):
     file = yaml.safe_load(skill_tests(name).read_text())
     assert file["skill"] == name
     assert file["suite"]
-    assert any(test["expect"]["outcome"] == "success" and not test.get("faults") for test in file["tests"])
+    succeeds = any(test["expect"]["outcome"] == "success" and not test.get("faults") for test in file["tests"])
+    assert succeeds or name in NEEDS_FIGURES
     assert any(test["expect"]["outcome"] == "failure" for test in file["tests"]) or name in NEVER_FAILS

@@ -10,11 +10,9 @@ from executive.testing.skill_suite import PARTS, SuiteCase
 from executive.testing.skill_test import bench_of_setup, carry_out, load_skill_tests, scripted_maker
 from skills.faults.fault_kinds import STANDARD_FAULTS
 from skills.robot import BaseKind
-from tests.project import project_skills, skill_tests
+from tests.project import NEEDS_FIGURES, project_skills, skill_tests
 
-FIGURES = ("find_person", "read_person")
-"""Skills that need figures of people, which scripted scenes do not have."""
-SKILLS = {name: skill for name, skill in project_skills().items() if name not in FIGURES}
+SKILLS = {name: skill for name, skill in project_skills().items() if name not in NEEDS_FIGURES}
 DRIVING = ("navigate", "approach", "back_off", "place", "hand_over", "relocalise", "find_people")
 
 

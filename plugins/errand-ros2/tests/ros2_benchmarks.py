@@ -459,25 +459,13 @@ def faults(by_rclpy):
                 folder, "run", "--say", f"go to the {room}", *where, *options, "--robot", f"ros2://alice?network={over}"
             )
             watch.wait_for(0.3, 400.0)
-            assert watch.seen[-1][2] > 0.3, run.said.read_text()
             return run
 
         robot = Errand(folder, "serve-ros2", network, *where)
         robot.says("ROS 2: /alice")
         told(f"a second simulator: {Errand(folder, 'serve-ros2', network, *where).ended()}")
-        other = (
-            "run",
-            "--say",
-            "wait for an hour",
-            *where,
-            "--no-record",
-            "--quiet",
-            "--out",
-            folder,
-            "--ros2",
-            network,
-        )
-        told(f"a run beside it: {Errand(folder, *other).ended()}")
+        say = ("run", "--say", "wait for an hour", *where, "--no-record", "--quiet", "--ros2", network, "--out")
+        told(f"a run beside it: {Errand(folder, *say, folder).ended()}")
         run = drive("bedroom")
         now = time.monotonic(), watch.seen[-1][1]
         run.process.kill()
@@ -499,7 +487,7 @@ def faults(by_rclpy):
         run, begun_s = drive("kitchen" if link is not None else "bedroom"), time.monotonic()
         robot.process.kill()
         told(f"robot killed: {run.ended()}; {time.monotonic() - begun_s:.0f} s")
-    (place, network), rows = place_over(by_rclpy, 41), []
+    (place, network) = place_over(by_rclpy, 41)
     with tempfile.TemporaryDirectory() as folder:
         say = ("run", "--say", "wait for an hour", *where, "--no-record", "--quiet", "--ros2", network, "--out")
         first = Errand(folder, *say, tempfile.mkdtemp(dir=folder))

@@ -3,11 +3,9 @@
 import pytest
 import yaml
 
-from tests.project import project_skills, skill_tests
+from tests.project import NEEDS_FIGURES, project_skills, skill_tests
 
 NEVER_FAILS = ("clear_costmap", "locate_dock")
-NEEDS_FIGURES = ("find_person", "read_person")
-"""Scripted scenes have no figures of people: these skills succeed in the plant alone (test_looking_mission.py)."""
 
 
 @pytest.mark.parametrize("name", sorted(project_skills()))

@@ -149,7 +149,7 @@ def refusal(world: World, grid: Grid, piece: Furniture, rooms: Mapping[str, Pose
     width, depth, height = piece.size
     place = covered(grid, piece.pose, Box(size=(depth, width, height), p=(0.0, 0.0, height / 2.0)))
     if not place.any() or np.any(grid.cells[place] != FREE):
-        return "it touches a wall or lies outside"
+        return "it touches a wall or furniture, or lies outside"
     after = with_furniture(grid, piece, BANDS_M["keepout"])
     clearance, outline = clearance_m(after), shapely.Polygon(piece.outline())
     for other, at in people_W(world):

@@ -38,7 +38,7 @@ def test_somebody_whom_the_detector_misses_is_not_denied(tmp_path):
     """Scans show a body as tall as a person; no picture's detection reaches the score that the stack asks for."""
 
     stack = tmp_path / "stack.yaml"
-    stack.write_text("skills: {find_people: {least_score: 1.0}}\n")
+    stack.write_text("skills: {find_people: {least_score: 1.0, viewpoints: 2}}\n")
     options = {"sentence": "is nobody in the hall", "stack": stack}
     end = PlantMission(tmp_path, 9442, change=stands_in_hall, **options).end("asked")
     assert (end.claimed, end.cause) == (False, "EXECUTION"), end.message
